@@ -1,0 +1,1 @@
+//! Dilation by the cutter, closing and residual on sampled heights.

@@ -1,0 +1,1 @@
+//! What the cut is against the design: deviation, gouge, cavities.

@@ -1,0 +1,1 @@
+//! Machines, fixtures, tools, and the split of a part into what a machine can hold.

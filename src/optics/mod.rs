@@ -1,0 +1,1 @@
+//! Half vector, Fresnel reflectance: pure light, no machining.

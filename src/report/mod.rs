@@ -1,0 +1,1 @@
+//! Everything shown, nothing computed: JSON, maps, pages.
