@@ -20,6 +20,7 @@
 pub mod cutter;
 pub mod grid;
 pub mod optics;
+pub mod progress;
 
 pub mod screen;
 
@@ -38,3 +39,5 @@ pub mod verify;
 pub mod fidelity;
 
 pub mod report;
+
+pub mod job;

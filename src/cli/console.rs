@@ -1,0 +1,106 @@
+//! Progress on the terminal, stage times, and the interrupt key.
+
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use screenmill::progress::Progress;
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Ctrl-C and a polite kill end the work at the next safe place; a second one ends it at once.
+pub fn listen_for_interrupt() -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::SeqCst) {
+            std::process::exit(2);
+        }
+    })
+}
+
+struct Stage {
+    name: String,
+    started: Instant,
+    bar: ProgressBar,
+}
+
+#[derive(Default)]
+struct State {
+    running: Option<Stage>,
+    done: Vec<(String, Duration)>,
+}
+
+/// A progress bar on a terminal, plain lines elsewhere, nothing if quiet; keeps each stage's time.
+pub struct Console {
+    state: Mutex<State>,
+    quiet: bool,
+    verbose: bool,
+    terminal: bool,
+}
+
+impl Console {
+    pub fn new(quiet: bool, verbose: bool) -> Console {
+        Console {
+            state: Mutex::new(State::default()),
+            quiet,
+            verbose,
+            terminal: std::io::stderr().is_terminal(),
+        }
+    }
+
+    /// Ends the running stage and gives every stage's time in order; a stage that ran more than
+    /// once is summed.
+    pub fn times(&self) -> Vec<(String, Duration)> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        self.finish(&mut state);
+        let mut summed: Vec<(String, Duration)> = Vec::new();
+        for (name, time) in &state.done {
+            match summed.iter_mut().find(|(other, _)| other == name) {
+                Some(entry) => entry.1 += *time,
+                None => summed.push((name.clone(), *time)),
+            }
+        }
+        summed
+    }
+
+    fn finish(&self, state: &mut State) {
+        if let Some(stage) = state.running.take() {
+            let time = stage.started.elapsed();
+            stage.bar.finish_and_clear();
+            if self.verbose {
+                eprintln!("{}: {:.2} s", stage.name, time.as_secs_f64());
+            }
+            state.done.push((stage.name, time));
+        }
+    }
+}
+
+impl Progress for Console {
+    fn begin(&self, stage: &str, total: u64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        self.finish(&mut state);
+        let bar = if self.quiet || !self.terminal {
+            ProgressBar::hidden()
+        } else {
+            let style = ProgressStyle::with_template("{msg:32} {bar:40} {percent:>3} % {eta:>5}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
+            ProgressBar::new(total).with_style(style).with_message(stage.to_string())
+        };
+        if !self.quiet && !self.terminal {
+            eprintln!("{stage} ...");
+        }
+        state.running = Some(Stage { name: stage.to_string(), started: Instant::now(), bar });
+    }
+
+    fn advance(&self, steps: u64) {
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(stage) = &state.running {
+            stage.bar.inc(steps);
+        }
+    }
+
+    fn interrupted(&self) -> bool {
+        INTERRUPTED.load(Ordering::SeqCst)
+    }
+}
