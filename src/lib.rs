@@ -21,6 +21,7 @@ pub mod cutter;
 pub mod grid;
 pub mod optics;
 pub mod progress;
+pub mod settings;
 
 pub mod screen;
 
