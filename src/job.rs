@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::settings;
+use crate::settings::{self, Source};
 
 /// JOB.toml as written. Paths are relative to the job's folder until [`Job::read`] resolves them.
 #[derive(Clone, Debug, Deserialize)]
@@ -228,171 +228,178 @@ pub enum Pattern {
 pub enum Error {
     #[error(transparent)]
     Settings(#[from] settings::Error),
-    #[error("{path}: schema is {found}, this version reads schema 1")]
-    Schema { path: String, found: u32 },
     #[error("{path}: [part] names {found} of screen, design, mesh and heights; hint: exactly one")]
     Source { path: String, found: usize },
     #[error("{path}: [part] {key} goes with {with} only; hint: {hint}")]
     Misplaced { path: String, key: &'static str, with: &'static str, hint: &'static str },
-    #[error("{path}: {key} is {value}, it must lie in {low} .. {high}")]
-    Range { path: String, key: String, value: f64, low: f64, high: f64 },
     #[error("{path}: no [[operation]]; hint: a job needs at least one, see samples/quickstart/job.toml")]
     NoOperation { path: String },
-    #[error("{path}: operation {number} ({kind}) {problem}; hint: {hint}")]
-    Operation { path: String, number: usize, kind: &'static str, problem: String, hint: &'static str },
-    #[error("{path}: cells {cells:?} hold nothing; hint: C0 R0 C1 R1 with C0 < C1 and R0 < R1")]
-    Cells { path: String, cells: [i32; 4] },
-    #[error("{path}: wcs is \"{wcs}\"; hint: G54, G55, G56, G57, G58 or G59")]
-    Wcs { path: String, wcs: String },
+    #[error("{path}:{line}: operation {number} ({kind}) {problem}; hint: {hint}")]
+    Operation {
+        path: String,
+        line: usize,
+        number: usize,
+        kind: &'static str,
+        problem: &'static str,
+        hint: &'static str,
+    },
+    #[error("{path}:{line}: cells {cells:?} hold nothing; hint: C0 R0 C1 R1 with C0 < C1 and R0 < R1")]
+    Cells { path: String, line: usize, cells: [i32; 4] },
 }
 
 impl Job {
     /// Reads and checks a job; paths in it come back resolved against its folder.
     pub fn read(path: &Path) -> Result<Job, Error> {
-        let mut job: Job = settings::read(path)?;
-        job.check(&path.display().to_string())?;
-        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let source = Source::read(path)?;
+        let mut job: Job = source.parse()?;
+        job.check(&source)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
         let part = &mut job.part;
-        for file in [
-            &mut part.screen,
-            &mut part.design,
-            &mut part.mesh,
-            &mut part.heights,
-            &mut part.elevation,
-            &mut job.tools.library,
-        ] {
-            if let Some(file) = file {
-                *file = folder.join(&*file);
-            }
+        let files = [&mut part.screen, &mut part.design, &mut part.mesh, &mut part.heights];
+        for file in files.into_iter().chain([&mut part.elevation, &mut job.tools.library]).flatten() {
+            *file = folder.join(&*file);
         }
         Ok(job)
     }
 
-    fn check(&self, path: &str) -> Result<(), Error> {
-        let path = || path.to_string();
-        if self.schema != 1 {
-            return Err(Error::Schema { path: path(), found: self.schema });
+    fn check(&self, source: &Source) -> Result<(), Error> {
+        source.schema(self.schema, 1)?;
+        self.check_part(source)?;
+        self.check_ranges(source)?;
+        let known = ["G54", "G55", "G56", "G57", "G58", "G59"];
+        if !known.contains(&self.machine.wcs.as_str()) {
+            return Err(source.unknown_value("machine.wcs", &self.machine.wcs, &known).into());
         }
+        if self.operations.is_empty() {
+            return Err(Error::NoOperation { path: source.path().into() });
+        }
+        for (index, operation) in self.operations.iter().enumerate() {
+            operation.check(source, index)?;
+        }
+        Ok(())
+    }
+
+    fn check_part(&self, source: &Source) -> Result<(), Error> {
+        let path = || source.path().to_string();
         let part = &self.part;
         let sources = [&part.screen, &part.design, &part.mesh, &part.heights];
         let found = sources.iter().filter(|source| source.is_some()).count();
         if found != 1 {
             return Err(Error::Source { path: path(), found });
         }
-        let misplaced = |key, given: bool, allowed: bool, with, hint| {
-            if given && !allowed {
-                Err(Error::Misplaced { path: path(), key, with, hint })
-            } else {
-                Ok(())
-            }
-        };
         let (mesh, heights) = (part.mesh.is_some(), part.heights.is_some());
-        let designed = part.screen.is_some() || part.design.is_some();
-        misplaced("cells", part.cells.is_some(), designed, "screen or design", "leave it out")?;
-        misplaced("elevation", part.elevation.is_some(), part.screen.is_some(), "screen", "leave it out")?;
-        misplaced("unit", part.unit.is_some(), mesh, "mesh", "leave it out")?;
-        misplaced("up", part.up.is_some(), mesh, "mesh", "leave it out")?;
-        misplaced("pixel_mm", part.pixel_mm.is_some(), heights, "heights", "leave it out")?;
-        misplaced("z_min_mm", part.z_min_mm.is_some(), heights, "heights", "leave it out")?;
-        misplaced("z_max_mm", part.z_max_mm.is_some(), heights, "heights", "leave it out")?;
-        misplaced(
-            "level = \"plane\"",
-            part.level == Level::Plane && heights,
-            false,
-            "screen, design or mesh",
-            "level the height image where it is made",
-        )?;
-        if let Some(cells) = part.cells
-            && (cells[0] >= cells[2] || cells[1] >= cells[3])
-        {
-            return Err(Error::Cells { path: path(), cells });
+        let (screen, level) = (part.screen.is_some(), part.level == Level::Plane);
+        let designed = screen || part.design.is_some();
+        let leave_out = "leave it out";
+        let level_hint = "level the height image where it is made";
+        let placed = [
+            ("cells", part.cells.is_some(), designed, "screen or design", leave_out),
+            ("elevation", part.elevation.is_some(), screen, "screen", leave_out),
+            ("unit", part.unit.is_some(), mesh, "mesh", leave_out),
+            ("up", part.up.is_some(), mesh, "mesh", leave_out),
+            ("pixel_mm", part.pixel_mm.is_some(), heights, "heights", leave_out),
+            ("z_min_mm", part.z_min_mm.is_some(), heights, "heights", leave_out),
+            ("z_max_mm", part.z_max_mm.is_some(), heights, "heights", leave_out),
+            ("level = \"plane\"", level, !heights, "screen, design or mesh", level_hint),
+        ];
+        for (key, given, allowed, with, hint) in placed {
+            if given && !allowed {
+                return Err(Error::Misplaced { path: path(), key, with, hint });
+            }
         }
-        if !matches!(self.machine.wcs.as_str(), "G54" | "G55" | "G56" | "G57" | "G58" | "G59") {
-            return Err(Error::Wcs { path: path(), wcs: self.machine.wcs.clone() });
+        match part.cells {
+            Some(cells) if cells[0] >= cells[2] || cells[1] >= cells[3] => {
+                Err(Error::Cells { path: path(), line: source.line_of("part.cells"), cells })
+            }
+            _ => Ok(()),
         }
-        self.check_ranges(path)?;
-        self.check_operations(path)
     }
 
-    fn check_ranges(&self, path: impl Fn() -> String) -> Result<(), Error> {
-        let within = |key: &str, value: f64, low: f64, high: f64| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(Error::Range { path: path(), key: key.into(), value, low, high })
-            }
-        };
-        let optional = |key: &str, value: Option<f64>, low: f64, high: f64| match value {
-            Some(value) => within(key, value, low, high),
-            None => Ok(()),
-        };
-        within("[part] step_mm", self.part.step_mm, 0.001, 1.0)?;
-        optional("[part] pixel_mm", self.part.pixel_mm, 1e-4, 100.0)?;
-        within("[stock] thickness_mm", self.stock.thickness_mm, 0.1, 500.0)?;
-        within("[stock] top_allowance_mm", self.stock.top_allowance_mm, 0.0, 50.0)?;
-        within("[stock] margin_mm", self.stock.margin_mm, 0.0, 200.0)?;
-        within("[stock] min_floor_mm", self.stock.min_floor_mm, 0.0, self.stock.thickness_mm)?;
-        within("[machine] clearance_mm", self.machine.clearance_mm, 0.1, 200.0)?;
-        optional("[limits] gouge_mm", self.limits.gouge_mm, 1e-4, 1.0)?;
-        optional("[limits] deviation_mm", self.limits.deviation_mm, 1e-4, 10.0)?;
-        optional("[limits] normal_p95_deg", self.limits.normal_p95_deg, 1e-3, 90.0)?;
-        optional("[limits] on_audience_min", self.limits.on_audience_min, 0.0, 1.0)?;
-        optional("[limits] hours_max", self.limits.hours_max, 1e-6, 1e6)
-    }
-
-    fn check_operations(&self, path: impl Fn() -> String) -> Result<(), Error> {
-        if self.operations.is_empty() {
-            return Err(Error::NoOperation { path: path() });
-        }
-        for (index, operation) in self.operations.iter().enumerate() {
-            let number = index + 1;
-            let kind = match operation.kind {
-                Kind::Rough => "rough",
-                Kind::Finish => "finish",
-            };
-            let refuse = |problem: String, hint| {
-                Err(Error::Operation { path: path(), number, kind, problem, hint })
-            };
-            let numbers = [
-                ("stepdown_mm", operation.stepdown_mm, 1e-3, 50.0),
-                ("stepover_mm", operation.stepover_mm, 1e-3, 100.0),
-                ("scallop_mm", operation.scallop_mm, 1e-6, 10.0),
-                ("stock_to_leave_mm", Some(operation.stock_to_leave_mm), 0.0, 10.0),
-                ("direction_deg", Some(operation.direction_deg), -360.0, 360.0),
-                ("feed_mm_min", operation.feed_mm_min, 1.0, 60_000.0),
-                ("plunge_mm_min", operation.plunge_mm_min, 1.0, 60_000.0),
-                ("spindle_rpm", operation.spindle_rpm, 1.0, 200_000.0),
-            ];
-            for (key, value, low, high) in numbers {
-                if let Some(value) = value
-                    && !(value >= low && value <= high)
-                {
-                    let key = format!("operation {number} ({kind}) {key}");
-                    return Err(Error::Range { path: path(), key, value, low, high });
-                }
-            }
-            match operation.kind {
-                Kind::Rough if operation.stepdown_mm.is_none() => {
-                    return refuse("has no stepdown_mm".into(), "0.05 to 0.15 of the cutter's diameter");
-                }
-                Kind::Rough if operation.scallop_mm.is_some() => {
-                    return refuse("has scallop_mm".into(), "roughing takes stepover_mm");
-                }
-                Kind::Finish if operation.stepdown_mm.is_some() => {
-                    return refuse(
-                        "has stepdown_mm".into(),
-                        "finishing follows the surface in one pass; a rough operation goes down by levels",
-                    );
-                }
-                Kind::Finish if operation.stepover_mm.is_some() == operation.scallop_mm.is_some() => {
-                    let both = operation.stepover_mm.is_some();
-                    let problem =
-                        if both { "has stepover_mm and scallop_mm" } else { "has no stepover_mm or scallop_mm" };
-                    return refuse(problem.into(), "exactly one of them");
-                }
-                _ => {}
+    fn check_ranges(&self, source: &Source) -> Result<(), Error> {
+        let (part, stock, limits) = (&self.part, &self.stock, &self.limits);
+        let ranges = [
+            ("part.step_mm", Some(part.step_mm), 0.001, 1.0),
+            ("part.pixel_mm", part.pixel_mm, 1e-4, 100.0),
+            ("stock.thickness_mm", Some(stock.thickness_mm), 0.1, 500.0),
+            ("stock.top_allowance_mm", Some(stock.top_allowance_mm), 0.0, 50.0),
+            ("stock.margin_mm", Some(stock.margin_mm), 0.0, 200.0),
+            ("stock.min_floor_mm", Some(stock.min_floor_mm), 0.0, stock.thickness_mm),
+            ("machine.clearance_mm", Some(self.machine.clearance_mm), 0.1, 200.0),
+            ("limits.gouge_mm", limits.gouge_mm, 1e-4, 1.0),
+            ("limits.deviation_mm", limits.deviation_mm, 1e-4, 10.0),
+            ("limits.normal_p95_deg", limits.normal_p95_deg, 1e-3, 90.0),
+            ("limits.on_audience_min", limits.on_audience_min, 0.0, 1.0),
+            ("limits.hours_max", limits.hours_max, 1e-6, 1e6),
+        ];
+        for (key, value, low, high) in ranges {
+            if let Some(value) = value {
+                source.within(key, value, low, high)?;
             }
         }
         Ok(())
+    }
+}
+
+impl Kind {
+    /// The word of the job file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Kind::Rough => "rough",
+            Kind::Finish => "finish",
+        }
+    }
+}
+
+impl Operation {
+    fn check(&self, source: &Source, index: usize) -> Result<(), Error> {
+        let ranges = [
+            ("stepdown_mm", self.stepdown_mm, 1e-3, 50.0),
+            ("stepover_mm", self.stepover_mm, 1e-3, 100.0),
+            ("scallop_mm", self.scallop_mm, 1e-6, 10.0),
+            ("stock_to_leave_mm", Some(self.stock_to_leave_mm), 0.0, 10.0),
+            ("direction_deg", Some(self.direction_deg), -360.0, 360.0),
+            ("feed_mm_min", self.feed_mm_min, 1.0, 60_000.0),
+            ("plunge_mm_min", self.plunge_mm_min, 1.0, 60_000.0),
+            ("spindle_rpm", self.spindle_rpm, 1.0, 200_000.0),
+        ];
+        for (key, value, low, high) in ranges {
+            if let Some(value) = value {
+                source.within(&format!("operation[{index}].{key}"), value, low, high)?;
+            }
+        }
+        let stepover = self.stepover_mm.is_some();
+        let problem = match self.kind {
+            Kind::Rough if self.stepdown_mm.is_none() => {
+                Some(("has no stepdown_mm", "0.05 to 0.15 of the cutter's diameter"))
+            }
+            Kind::Rough if self.scallop_mm.is_some() => {
+                Some(("has scallop_mm", "roughing takes stepover_mm"))
+            }
+            Kind::Rough if self.pattern == Pattern::OneWay => {
+                Some(("has pattern = \"one-way\"", "roughing is zigzag; leave pattern out"))
+            }
+            Kind::Finish if self.stepdown_mm.is_some() => Some((
+                "has stepdown_mm",
+                "finishing is one pass over the surface; a rough operation has levels",
+            )),
+            Kind::Finish if stepover && self.scallop_mm.is_some() => {
+                Some(("has stepover_mm and scallop_mm", "name one of them"))
+            }
+            Kind::Finish if !stepover && self.scallop_mm.is_none() => {
+                Some(("has no stepover_mm or scallop_mm", "name one of them"))
+            }
+            _ => None,
+        };
+        match problem {
+            Some((problem, hint)) => Err(Error::Operation {
+                path: source.path().into(),
+                line: source.line_of(&format!("operation[{index}].kind")),
+                number: index + 1,
+                kind: self.kind.word(),
+                problem,
+                hint,
+            }),
+            None => Ok(()),
+        }
     }
 }

@@ -51,9 +51,11 @@ fn imports(text: &str) -> Vec<String> {
             let rest = &text[at + prefix.len()..];
             if let Some(group) = rest.strip_prefix('{') {
                 let inside = group.split('}').next().unwrap_or_default();
-                rooms.extend(inside.split(',').map(|word| {
-                    word.trim().split("::").next().unwrap_or_default().to_string()
-                }));
+                rooms.extend(
+                    inside
+                        .split(',')
+                        .map(|word| word.trim().split("::").next().unwrap_or_default().to_string()),
+                );
             } else {
                 rooms.push(rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect());
             }
