@@ -1,1 +1,2 @@
 //! What the cut is against the design: deviation, gouge, cavities.
+pub mod light;
