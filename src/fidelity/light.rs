@@ -14,7 +14,7 @@ use crate::grid::{Heights, Window};
 const BINS: usize = 20;
 
 /// Probes across each bin that measure how much of it the audience fills.
-const PROBES: usize = 12;
+const PROBES: usize = 24;
 
 /// Bins that the audience fills less than this are left out of the uniformity.
 const FILLED: f64 = 0.25;
