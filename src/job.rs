@@ -48,15 +48,33 @@ pub struct Part {
     /// Pitch of a height image that carries none.
     pub pixel_mm: Option<f64>,
     /// Unit of a mesh: "mm", "m" or "inch".
-    pub unit: Option<String>,
+    pub unit: Option<Unit>,
     /// Axis of a mesh that points out of the stock: "x", "y" or "z".
-    pub up: Option<String>,
+    pub up: Option<Up>,
     pub z_min_mm: Option<f64>,
     pub z_max_mm: Option<f64>,
 }
 
 fn ten_micrometres() -> f64 {
     0.010
+}
+
+/// Unit of a mesh's numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    Mm,
+    M,
+    Inch,
+}
+
+/// Axis of a mesh that points out of the stock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Up {
+    X,
+    Y,
+    Z,
 }
 
 /// What stands outside the part: nothing, or material to keep up to the stock's top.
@@ -301,6 +319,14 @@ impl Job {
             ("z_min_mm", part.z_min_mm.is_some(), heights, "heights", leave_out),
             ("z_max_mm", part.z_max_mm.is_some(), heights, "heights", leave_out),
             ("level = \"plane\"", level, !heights, "screen, design or mesh", level_hint),
+            ("level = \"plane\"", level, part.form == Form::Part, "form = \"part\"", "cut the die unlevelled"),
+            (
+                "level = \"plane\"",
+                level,
+                self.stock.blanks == Blanks::PerTile || mesh,
+                "blanks = \"per-tile\"",
+                "tiles of one sheet cannot each be turned",
+            ),
         ];
         for (key, given, allowed, with, hint) in placed {
             if given && !allowed {
