@@ -23,6 +23,9 @@ pub struct Job {
     pub maps: Maps,
     #[serde(default, rename = "operation")]
     pub operations: Vec<Operation>,
+    /// What programs and pages call the part: the job's folder and file name.
+    #[serde(skip)]
+    pub name: String,
 }
 
 /// What is to be cut: exactly one of `screen`, `design`, `mesh`, `heights`.
@@ -272,6 +275,7 @@ impl Job {
         let mut job: Job = source.parse()?;
         job.check(&source)?;
         let folder = path.parent().unwrap_or(Path::new(""));
+        job.name = name_of(path);
         let part = &mut job.part;
         let files = [&mut part.screen, &mut part.design, &mut part.mesh, &mut part.heights];
         for file in files.into_iter().chain([&mut part.elevation, &mut job.tools.library]).flatten() {
@@ -363,6 +367,16 @@ impl Job {
             }
         }
         Ok(())
+    }
+}
+
+/// The file's name, after its folder's where the file is called `job.toml`.
+fn name_of(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let full = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    match full.parent().and_then(Path::file_name) {
+        Some(folder) if stem == "job" => folder.to_string_lossy().into_owned(),
+        _ => stem,
     }
 }
 

@@ -7,7 +7,8 @@ use super::Error;
 use super::light::Sight;
 use crate::compensation::{self, Profile, RowPass, RowTarget};
 use crate::fidelity::light::LightTally;
-use crate::fidelity::{Layers, Tally};
+use crate::fidelity::cavities::{self, Labelled};
+use crate::fidelity::{self, Cavities, Found, Layers, Tally};
 use crate::grid::{Heights, Window};
 use crate::progress::Progress;
 use crate::surface::Surface;
@@ -30,10 +31,13 @@ pub struct Case<'a> {
     pub blank: Blank,
     /// The programs of each post in run order.
     pub posts: &'a [Vec<Judged<'a>>],
-    /// Every cutter of the job once; none: no cavities are looked for.
+    /// Every cutter of the job once.
     pub cutters: &'a [Profile],
+    /// Smaller cutters, largest first, that might reach what the job's cutters leave.
+    pub candidates: &'a [Profile],
     pub passes: &'a [ExactPasses],
-    pub tally: crate::fidelity::Params,
+    pub tally: fidelity::Params,
+    pub cavities: cavities::Params,
     pub sight: Option<&'a Sight<'a>>,
 }
 
@@ -43,6 +47,7 @@ pub struct Verdict {
     pub tallies: Vec<Tally>,
     /// For each post and program.
     pub cuts: Vec<Vec<ProgramCut>>,
+    pub cavities: Found,
     pub light_designed: LightTally,
     /// For each post.
     pub light_machined: Vec<LightTally>,
@@ -59,6 +64,7 @@ struct Block {
     design: Heights,
     machined: Heights,
     cavity: Heights,
+    labelled: Labelled,
     tallies: Vec<Tally>,
     cuts: Vec<Vec<ProgramCut>>,
     light_designed: LightTally,
@@ -72,12 +78,12 @@ pub fn judge(
     each: &mut dyn FnMut(Strip) -> Result<(), Error>,
 ) -> Result<Verdict, Error> {
     let lattice = case.surface.lattice();
-    let mut verdict = Verdict {
-        tallies: case.posts.iter().map(|_| Tally::new(case.tally)).collect(),
-        cuts: case.posts.iter().map(|programs| vec![ProgramCut::default(); programs.len()]).collect(),
-        light_designed: LightTally::default(),
-        light_machined: case.posts.iter().map(|_| LightTally::default()).collect(),
-    };
+    let mut tallies: Vec<Tally> = case.posts.iter().map(|_| Tally::new(case.tally)).collect();
+    let mut cuts: Vec<Vec<ProgramCut>> =
+        case.posts.iter().map(|programs| vec![ProgramCut::default(); programs.len()]).collect();
+    let mut light_designed = LightTally::default();
+    let mut light_machined: Vec<LightTally> = case.posts.iter().map(|_| LightTally::default()).collect();
+    let mut cavities = Cavities::new(case.cavities, lattice.window());
     for row in (0..lattice.rows).step_by(BLOCK_ROWS) {
         let rows = BLOCK_ROWS.min(lattice.rows - row);
         let starts: Vec<usize> = (0..lattice.columns).step_by(BLOCK_COLUMNS).collect();
@@ -101,31 +107,24 @@ pub fn judge(
             cavity: Heights::empty(window),
         };
         for block in blocks {
-            verdict.take(&block);
             paste(&mut strip.design, &block.design);
             paste(&mut strip.machined, &block.machined);
             paste(&mut strip.cavity, &block.cavity);
+            for (sum, tally) in tallies.iter_mut().zip(&block.tallies) {
+                sum.merge(tally);
+            }
+            for (sum, cut) in cuts.iter_mut().flatten().zip(block.cuts.iter().flatten()) {
+                sum.merge(cut);
+            }
+            light_designed.merge(&block.light_designed);
+            for (sum, light) in light_machined.iter_mut().zip(&block.light_machined) {
+                sum.merge(light);
+            }
+            cavities.add(block.labelled)?;
         }
         each(strip)?;
     }
-    Ok(verdict)
-}
-
-impl Verdict {
-    fn take(&mut self, block: &Block) {
-        for (sum, tally) in self.tallies.iter_mut().zip(&block.tallies) {
-            sum.merge(tally);
-        }
-        for (sums, cuts) in self.cuts.iter_mut().zip(&block.cuts) {
-            for (sum, cut) in sums.iter_mut().zip(cuts) {
-                sum.merge(cut);
-            }
-        }
-        self.light_designed.merge(&block.light_designed);
-        for (sum, light) in self.light_machined.iter_mut().zip(&block.light_machined) {
-            sum.merge(light);
-        }
-    }
+    Ok(Verdict { tallies, cuts, cavities: cavities.finish(), light_designed, light_machined })
 }
 
 fn paste(strip: &mut Heights, block: &Heights) {
@@ -140,11 +139,19 @@ impl Case<'_> {
     fn block(&self, window: Window) -> Result<Block, Error> {
         let datum_mm = self.surface.top_mm();
         let lattice = self.surface.lattice();
-        let reach = self.cutters.iter().map(Profile::reach).max().unwrap_or(0);
+        let profiles = self.cutters.iter().chain(self.candidates);
+        let reach = profiles.map(Profile::reach).max().unwrap_or(0);
         let around = self.surface.heights(window.grown((2 * reach).max(1)), datum_mm)?;
         let design = around.crop(window);
         let cavity = self.cavity(&around, &design);
         let passes = self.exact_passes(&around, window);
+        let residuals: Vec<Heights> = self
+            .candidates
+            .iter()
+            .map(|profile| compensation::residual(&compensation::closing(&around, profile, window), &design))
+            .collect();
+        let residuals: Vec<&Heights> = residuals.iter().collect();
+        let labelled = cavities::label(window, &cavity, &residuals, &self.cavities)?;
         let mut block = Block {
             machined: Heights::empty(window),
             tallies: Vec::new(),
@@ -153,6 +160,7 @@ impl Case<'_> {
             light_machined: Vec::new(),
             design,
             cavity,
+            labelled,
         };
         let near = around.crop(window.grown(1));
         drop(around);
