@@ -1,3 +1,5 @@
+use serde::Deserialize;
+
 /// Cells C0 <= column < C1, R0 <= row < R1 of the screen's grid; cell (0, 0) is lower left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CellRange {
@@ -25,14 +27,16 @@ impl CellRange {
 }
 
 /// Convex bump (paper) or concave dish.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Profile {
     Bump,
     Dish,
 }
 
 /// Vertical steps between cells (paper), or cells extended until they meet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Seam {
     Step,
     Stitched,
