@@ -37,9 +37,7 @@ pub enum Error {
         "{path}:{line}: the screen has {columns} x {rows} cells, at most {most} can be designed; hint: wider cells or a smaller screen"
     )]
     TooManyCells { path: String, line: usize, columns: f64, rows: f64, most: f64 },
-    #[error(
-        "{path}:{line}: the reflector is {given}; hint: give material = \"aluminium\", or both n and k"
-    )]
+    #[error("{path}:{line}: the reflector is {given}; hint: give material = \"aluminium\", or both n and k")]
     Reflector { path: String, line: usize, given: &'static str },
     #[error(
         "cells {c0} {r0} {c1} {r1} do not lie in the screen's {columns} x {rows} cells; hint: --cells C0 R0 C1 R1 with 0 <= C0 < C1 <= {columns} and 0 <= R0 < R1 <= {rows}"

@@ -7,7 +7,7 @@ use crate::optics::ComplexIndex;
 use crate::settings::{Numbers, Source};
 
 use super::audience::{Polyhedron, View};
-use super::{Error, Profile, Seam};
+use super::{Error, Profile, Seam, sight};
 
 /// The schema of scene files that is read.
 pub const SCHEMA: u32 = 1;
@@ -196,6 +196,21 @@ impl Scene {
     /// Whether the ray from `origin_m` along `direction` (of any length) meets an audience.
     pub fn audience_hit(&self, origin_m: DVec3, direction: DVec3) -> bool {
         self.audience.iter().any(|polyhedron| polyhedron.hit(origin_m, direction))
+    }
+
+    /// Refuses a point of the screen from which nothing can be reflected to an audience.
+    pub(super) fn check_point(&self, (column, row): (i32, i32), point_m: DVec3) -> Result<(), Error> {
+        let DVec3 { x: x_m, y: y_m, z: z_m } = point_m;
+        if self.projector_m.z <= z_m {
+            return Err(Error::BehindProjector { column, row, z_m, projector_m: self.projector_m.z });
+        }
+        if let Some(polyhedron) = self.audience.iter().find(|p| p.contains(point_m)) {
+            return Err(Error::Inside { column, row, x_m, y_m, z_m, name: polyhedron.name.clone() });
+        }
+        if !sight::sees(&self.audience, point_m) {
+            return Err(Error::SeesNoAudience { column, row, x_m, y_m, z_m });
+        }
+        Ok(())
     }
 
     /// The audience as one point sees it, for many rays from there.
