@@ -10,10 +10,11 @@
 
 use super::ball::{self, Reachable};
 use super::field::{Field, PAD, Targets};
-use super::lanes::{LANES, raise, whole_groups, widest};
+use super::lanes::{LANES, Vectors, raise, whole_groups, widest};
 use super::pairs::Pairs;
 use super::slopes::{CELL, Rises, RowRises};
 use super::stencil::ArcRef;
+use std::marker::PhantomData;
 
 /// Samples of a row that are first tried as one run.
 const BLOCK: usize = 4 * CELL;
@@ -39,11 +40,12 @@ widest! {
 }
 
 #[inline(always)]
-fn body<P: Pairs>(field: &Field, pairs: &P, search: Search, out: &mut Targets) {
+fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, search: Search, out: &mut Targets) {
     let with_y = pairs.is_lattice();
     let boxed = search.is_ball && with_y;
     let mut rises = RowRises::new(field);
-    let mut run = Runs { field, pairs, search, slack_mm: pairs.slack_mm(), starts: Vec::new() };
+    let slack_mm = pairs.slack_mm();
+    let mut run = Runs::<V, P> { field, pairs, search, slack_mm, starts: Vec::new(), vectors: PhantomData };
     for a in 0..field.rows as i64 {
         rises.measure(field, a, with_y);
         run.starts.clear();
@@ -62,16 +64,17 @@ fn body<P: Pairs>(field: &Field, pairs: &P, search: Search, out: &mut Targets) {
     }
 }
 
-struct Runs<'a, P: Pairs> {
+struct Runs<'a, V: Vectors, P: Pairs> {
     field: &'a Field,
     pairs: &'a P,
     search: Search,
     slack_mm: f32,
     /// Where the last block's contacts lay, by target row: the next block's lie close by.
     starts: Vec<[i32; 2]>,
+    vectors: PhantomData<V>,
 }
 
-impl<P: Pairs> Runs<'_, P> {
+impl<V: Vectors, P: Pairs> Runs<'_, V, P> {
     #[inline(always)]
     fn reachable(&self, rises: Rises) -> Option<Reachable> {
         ball::reachable(self.search.radius, self.search.step_mm, self.slack_mm, rises)
@@ -325,7 +328,7 @@ impl<P: Pairs> Runs<'_, P> {
                 if start < end {
                     let n = whole_groups((end - start) as usize);
                     let from = &row[(PAD as i64 + start + shift + dx as i64) as usize..][..n];
-                    raise(&mut to[start as usize..][..n], from, arc.s(dx));
+                    raise::<V>(&mut to[start as usize..][..n], from, arc.s(dx));
                 }
             }
         } else {
@@ -336,7 +339,7 @@ impl<P: Pairs> Runs<'_, P> {
                 if start < end {
                     let n = whole_groups((end - start) as usize);
                     let from = &arc.values[arc.index((origin - start) as i32)..][..n];
-                    raise(&mut to[start as usize..][..n], from, row[PAD + i]);
+                    raise::<V>(&mut to[start as usize..][..n], from, row[PAD + i]);
                 }
             }
         }
