@@ -20,6 +20,7 @@
 pub mod cutter;
 pub mod grid;
 pub mod optics;
+pub mod settings;
 
 pub mod screen;
 
