@@ -25,6 +25,7 @@ const BULGE_MOST: f64 = 0.25;
 pub(super) struct Cutter {
     exact: Profile,
     wide: Profile,
+    radius_mm: f64,
     tip_mm: f64,
     /// Farthest contact from the tip's centre that is still on the round part.
     round_mm: f64,
@@ -62,6 +63,7 @@ impl Cutter {
         Cutter {
             exact: Profile::new(shape, step_mm, 0.0),
             wide: Profile::new(shape, step_mm, allowance_mm),
+            radius_mm: shape.radius_mm(),
             tip_mm,
             round_mm,
             pitch_mm,
@@ -78,7 +80,8 @@ impl Cutter {
             return envelope;
         }
         let cl_mm = self.row(strip, &self.exact, start_mm, across_mm, count);
-        let ceiling = strip.ceiling(across_mm, self.reach_mm);
+        let within_mm = self.radius_mm + self.budget.path_tolerance_mm + 0.5 * self.pitch_mm;
+        let ceiling = strip.ceiling(across_mm, within_mm);
         let mut bound_mm: Vec<f64> =
             cl_mm.iter().map(|&z| if z.is_nan() { f64::NEG_INFINITY } else { f64::from(z) }).collect();
         let mut steep = vec![false; count.saturating_sub(1)];

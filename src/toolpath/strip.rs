@@ -11,16 +11,15 @@ const MOST_SAMPLES: usize = 1 << 28;
 /// Samples a band aims at: large against its halo, small against the memory of a small machine.
 const BAND_SAMPLES: usize = 1 << 23;
 
-const BLOCK: usize = 8;
+/// Rows whose maxima are kept, so that a pass need not look at all of its rows again.
+const BLOCK: usize = 4;
 
 /// Heights in the frame of the passes: columns along, rows across.
 pub(super) struct Strip {
     pub(super) heights: Heights,
     pub(super) step_mm: f64,
-    /// Maximum of each BLOCK x BLOCK samples.
+    /// Maximum over BLOCK rows of each column; -inf where there is no data.
     blocks: Vec<f32>,
-    block_columns: usize,
-    block_rows: usize,
 }
 
 /// How many passes from `first` on fit one band.
@@ -55,67 +54,86 @@ impl Strip {
     }
 
     pub(super) fn new(heights: Heights, step_mm: f64) -> Strip {
-        let window = heights.window;
-        let block_columns = window.columns.div_ceil(BLOCK);
-        let block_rows = window.rows.div_ceil(BLOCK);
-        let mut blocks = vec![f32::NEG_INFINITY; block_columns * block_rows];
-        for (r, row) in heights.z_mm.chunks_exact(window.columns).enumerate() {
-            let out = &mut blocks[r / BLOCK * block_columns..][..block_columns];
-            for (block, samples) in out.iter_mut().zip(row.chunks(BLOCK)) {
-                for &z in samples {
-                    *block = if z > *block { z } else { *block };
-                }
-            }
+        let columns = heights.window.columns;
+        let mut blocks = vec![f32::NEG_INFINITY; columns * heights.window.rows.div_ceil(BLOCK)];
+        for (rows, block) in heights.z_mm.chunks(BLOCK * columns).zip(blocks.chunks_exact_mut(columns)) {
+            rows.chunks_exact(columns).for_each(|row| raise(block, row));
         }
-        Strip { heights, step_mm, blocks, block_columns, block_rows }
+        Strip { heights, step_mm, blocks }
     }
 
-    /// For a pass at `across_mm`: the highest sample within `reach_mm` of each block column, at least.
+    /// For a pass at `across_mm`: the highest sample of the square `reach_mm` around each column.
     pub(super) fn ceiling(&self, across_mm: f64, reach_mm: f64) -> Ceiling {
         let window = self.heights.window;
         let row_of = |mm: f64| mm / self.step_mm - 0.5 - window.row as f64;
-        let last = self.block_rows as i64 - 1;
-        let low = ((row_of(across_mm - reach_mm).floor() as i64).div_euclid(BLOCK as i64)).clamp(0, last);
-        let high = ((row_of(across_mm + reach_mm).ceil() as i64).div_euclid(BLOCK as i64)).clamp(0, last);
-        let mut columns = vec![f32::NEG_INFINITY; self.block_columns];
-        for row in low..=high {
-            let blocks = &self.blocks[row as usize * self.block_columns..][..self.block_columns];
-            for (column, &z) in columns.iter_mut().zip(blocks) {
-                *column = column.max(z);
-            }
+        let low = row_of(across_mm - reach_mm).floor().max(0.0) as usize;
+        let end = (row_of(across_mm + reach_mm).ceil().max(0.0) as usize + 1).min(window.rows);
+        let mut z_mm = vec![f32::NEG_INFINITY; window.columns];
+        let mut row = low;
+        while row < end {
+            let (from, rows) = if row % BLOCK == 0 && row + BLOCK <= end {
+                (&self.blocks[row / BLOCK * window.columns..], BLOCK)
+            } else {
+                (&self.heights.z_mm[row * window.columns..], 1)
+            };
+            raise(&mut z_mm, &from[..window.columns]);
+            row += rows;
         }
-        let around = (reach_mm / self.step_mm / BLOCK as f64).ceil() as usize + 1;
-        let spread = (0..columns.len())
-            .map(|c| {
-                let from = c.saturating_sub(around);
-                let to = (c + around + 1).min(columns.len());
-                columns[from..to].iter().copied().fold(f32::NEG_INFINITY, f32::max)
-            })
-            .collect();
-        Ceiling {
-            z_mm: spread,
-            scale: 1.0 / (self.step_mm * BLOCK as f64),
-            first: window.column as f64 + 0.5,
-            step_mm: self.step_mm,
-        }
+        let around = (reach_mm / self.step_mm).ceil() as usize + 1;
+        Ceiling { z_mm: sliding(&z_mm, around, f32::max), first: window.column, step_mm: self.step_mm }
+    }
+}
+
+/// Raises each height to the other one, where that is data.
+fn raise(heights: &mut [f32], others: &[f32]) {
+    for (z, &other) in heights.iter_mut().zip(others) {
+        *z = if other > *z { other } else { *z };
     }
 }
 
 /// An upper bound of the heights in reach along one pass.
 pub(super) struct Ceiling {
     z_mm: Vec<f32>,
-    scale: f64,
-    first: f64,
+    first: i64,
     step_mm: f64,
 }
 
 impl Ceiling {
-    /// The highest sample in reach of a place along the pass, at least.
+    /// The highest sample in reach of a place along the pass.
     pub(super) fn at(&self, along_mm: f64) -> f64 {
-        let block = ((along_mm - self.first * self.step_mm) * self.scale).floor();
-        let last = self.z_mm.len() - 1;
-        f64::from(self.z_mm[(block.max(0.0) as usize).min(last)])
+        let column = (along_mm / self.step_mm).floor() as i64 - self.first;
+        f64::from(self.z_mm[column.clamp(0, self.z_mm.len() as i64 - 1) as usize])
     }
+}
+
+/// The `pick` (minimum or maximum) of the values up to `reach` to either side: van Herk and Gil-Werman,
+/// three picks a value.
+fn sliding(values: &[f32], reach: usize, pick: fn(f32, f32) -> f32) -> Vec<f32> {
+    let width = 2 * reach + 1;
+    let count = values.len();
+    let mut forward = values.to_vec();
+    let mut backward = values.to_vec();
+    for i in 1..count {
+        if i % width != 0 {
+            forward[i] = pick(forward[i], forward[i - 1]);
+        }
+    }
+    for i in (0..count.saturating_sub(1)).rev() {
+        if (i + 1) % width != 0 {
+            backward[i] = pick(backward[i], backward[i + 1]);
+        }
+    }
+    (0..count)
+        .map(|i| {
+            let (low, high) = (i.saturating_sub(reach), (i + reach).min(count - 1));
+            if low / width == high / width && high - low + 1 < width {
+                // Cut off by an end: one block holds it all.
+                values[low..=high].iter().copied().fold(values[i], pick)
+            } else {
+                pick(backward[low], forward[high])
+            }
+        })
+        .collect()
 }
 
 /// Lowest height near each sample of the tile's borders.
@@ -142,7 +160,7 @@ impl Border {
             let heights = along.heights(surface, window)?;
             let rows: Vec<f32> =
                 heights.z_mm.chunks_exact(broad).map(|row| lowest(&mut row.iter().copied())).collect();
-            *out = sliding_minimum(&rows, breadth);
+            *out = sliding(&rows, breadth, f32::min);
         }
         let mut sides = [Vec::new(), Vec::new()];
         for (side, out) in sides.iter_mut().enumerate() {
@@ -156,7 +174,7 @@ impl Border {
                     *low = low.min(z);
                 }
             }
-            *out = sliding_minimum(&all, breadth);
+            *out = sliding(&all, breadth, f32::min);
         }
         Ok(Border { ends, sides, step_mm: lattice.step_mm })
     }
@@ -189,11 +207,23 @@ fn outside(at_mm: f64, length_mm: f64) -> Option<usize> {
     }
 }
 
-fn sliding_minimum(values: &[f32], reach: usize) -> Vec<f32> {
-    (0..values.len())
-        .map(|i| {
-            let window = &values[i.saturating_sub(reach)..(i + reach + 1).min(values.len())];
-            window.iter().copied().fold(f32::INFINITY, f32::min)
-        })
-        .collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sliding_picks_what_a_loop_picks() {
+        let values: Vec<f32> = (0..97u32).map(|i| (i * 37 % 53) as f32).collect();
+        for reach in [0, 1, 3, 20, 60, 200] {
+            for count in [1, 2, 7, 50, 97] {
+                let naive: Vec<f32> = (0..count)
+                    .map(|i: usize| {
+                        let near = &values[i.saturating_sub(reach)..(i + reach + 1).min(count)];
+                        near.iter().copied().fold(f32::INFINITY, f32::min)
+                    })
+                    .collect();
+                assert_eq!(sliding(&values[..count], reach, f32::min), naive, "{reach} {count}");
+            }
+        }
+    }
 }
