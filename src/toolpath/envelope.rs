@@ -12,14 +12,24 @@
 //!   a cutter widened by dx/2 + P the larger of both ends bounds the whole interval. A flat cutter
 //!   needs sqrt((R + P)^2 + (dx/2)^2) only.
 
-use super::drop::{self, Profile};
-use super::passes::tip_radius_mm;
-use super::strip::Strip;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::passes::{Layout, tip_radius_mm};
+use super::strip::{Ceiling, Strip};
+use crate::compensation::{self, Profile, RowTarget};
 use crate::cutter::Shape;
 use crate::tolerance::Budget;
 
 /// A curved bound that asks for more than this share of the pitch gives way to the steep one.
 const BULGE_MOST: f64 = 0.25;
+
+/// Distances from the axis, as parts of the radius, within which the highest sample is known.
+const RINGS: [f64; 4] = [1.0, 0.88, 0.76, 0.6];
+
+/// Columns of the blocks in which steep places are evaluated together.
+const STEEP_BLOCK: usize = 256;
 
 /// A cutter as the planner asks about it.
 pub(super) struct Cutter {
@@ -53,45 +63,80 @@ fn allowance_mm(shape: &Shape, half_mm: f64, path_tolerance_mm: f64) -> f64 {
 }
 
 impl Cutter {
-    pub(super) fn new(shape: Shape, step_mm: f64, pitch_mm: f64, budget: Budget) -> Cutter {
+    /// For positions `pitch_mm` apart on samples `step_mm` apart.
+    ///
+    /// # Errors
+    /// The cutter is smaller than a sample or spans too many.
+    pub(super) fn new(
+        shape: Shape,
+        step_mm: f64,
+        pitch_mm: f64,
+        budget: Budget,
+    ) -> Result<Cutter, compensation::Error> {
         let allowance_mm = allowance_mm(&shape, 0.5 * pitch_mm, budget.path_tolerance_mm);
         let tip_mm = tip_radius_mm(&shape);
         let round_mm = match shape {
             Shape::Taper { half_angle_deg, .. } => tip_mm * half_angle_deg.to_radians().cos(),
             _ => tip_mm,
         };
-        Cutter {
-            exact: Profile::new(shape, step_mm, 0.0),
-            wide: Profile::new(shape, step_mm, allowance_mm),
+        Ok(Cutter {
+            exact: Profile::new(shape, step_mm, 0.0)?,
+            wide: Profile::new(shape, step_mm, allowance_mm)?,
             radius_mm: shape.radius_mm(),
             tip_mm,
             round_mm,
             pitch_mm,
             budget,
             reach_mm: shape.radius_mm() + allowance_mm + pitch_mm + step_mm,
-        }
+        })
     }
 
-    /// The bound of one pass by the better of both ways, interval by interval.
-    pub(super) fn envelope(&self, strip: &Strip, start_mm: f64, across_mm: f64, count: usize) -> Envelope {
+    /// The bounds of a band's passes by the better of both ways, interval by interval.
+    pub(super) fn envelopes(&self, strip: &Strip, layout: &Layout, passes: Range<usize>) -> Vec<Envelope> {
+        let exact = self.rows(strip, &self.exact, layout, passes.clone());
         if self.tip_mm <= 0.0 {
-            let mut envelope = self.widened(strip, start_mm, across_mm, count);
-            envelope.cl_mm = self.row(strip, &self.exact, start_mm, across_mm, count);
-            return envelope;
+            let mut envelopes = self.widened(strip, layout, passes);
+            envelopes.par_iter_mut().zip(exact).for_each(|(envelope, cl_mm)| envelope.cl_mm = cl_mm);
+            return envelopes;
         }
-        let cl_mm = self.row(strip, &self.exact, start_mm, across_mm, count);
-        let within_mm = self.radius_mm + self.budget.path_tolerance_mm + 0.5 * self.pitch_mm;
-        let ceiling = strip.ceiling(across_mm, within_mm);
+        let curved: Vec<(Envelope, Vec<bool>)> = passes
+            .clone()
+            .into_par_iter()
+            .zip(exact)
+            .map(|(k, cl_mm)| self.curved(strip, layout, layout.across_mm(k), cl_mm))
+            .collect();
+        let (mut envelopes, steep): (Vec<Envelope>, Vec<Vec<bool>>) = curved.into_iter().unzip();
+        let wide = self.steep_places(strip, layout, passes, &steep);
+        envelopes.par_iter_mut().zip(steep).zip(wide).for_each(|((envelope, steep), wide)| {
+            for (i, _) in steep.iter().enumerate().filter(|s| *s.1) {
+                let higher = f64::from(wide[i]).max(f64::from(wide[i + 1]));
+                envelope.bound_mm[i] = envelope.bound_mm[i].max(higher);
+                envelope.bound_mm[i + 1] = envelope.bound_mm[i + 1].max(higher);
+            }
+        });
+        envelopes
+    }
+
+    /// Bounds of one pass where its intervals are curved, and which intervals are not.
+    fn curved(
+        &self,
+        strip: &Strip,
+        layout: &Layout,
+        across_mm: f64,
+        cl_mm: Vec<f32>,
+    ) -> (Envelope, Vec<bool>) {
+        let around_mm = self.budget.path_tolerance_mm + 0.5 * self.pitch_mm;
+        let ceilings = RINGS.map(|part| strip.ceiling(across_mm, part * self.radius_mm + around_mm));
         let mut bound_mm: Vec<f64> =
             cl_mm.iter().map(|&z| if z.is_nan() { f64::NEG_INFINITY } else { f64::from(z) }).collect();
-        let mut steep = vec![false; count.saturating_sub(1)];
-        for i in 1..count {
+        let mut steep = vec![false; cl_mm.len().saturating_sub(1)];
+        for i in 1..cl_mm.len() {
             if cl_mm[i - 1].is_nan() || cl_mm[i].is_nan() {
                 continue;
             }
             let (left, right) = (f64::from(cl_mm[i - 1]), f64::from(cl_mm[i]));
-            let middle_mm = start_mm + (i as f64 - 0.5) * self.pitch_mm;
-            match self.lift_mm(ceiling.at(middle_mm) - left.min(right)) {
+            let middle_mm = layout.start_mm() + (i as f64 - 0.5) * self.pitch_mm;
+            match self.contact_mm(&ceilings, middle_mm, left.min(right)).and_then(|t| self.lift_mm(t)) {
                 Some(lift_mm) => {
                     bound_mm[i - 1] = bound_mm[i - 1].max(left + lift_mm);
                     bound_mm[i] = bound_mm[i].max(right + lift_mm);
@@ -99,37 +144,66 @@ impl Cutter {
                 None => steep[i - 1] = true,
             }
         }
-        let mut i = 0;
-        while i < steep.len() {
-            if !steep[i] {
-                i += 1;
-                continue;
-            }
-            let end = i + steep[i..].iter().take_while(|&&s| s).count();
-            let wide =
-                self.row(strip, &self.wide, start_mm + i as f64 * self.pitch_mm, across_mm, end - i + 1);
-            for (k, pair) in wide.windows(2).enumerate() {
-                let higher = f64::from(pair[0]).max(f64::from(pair[1]));
-                bound_mm[i + k] = bound_mm[i + k].max(higher);
-                bound_mm[i + k + 1] = bound_mm[i + k + 1].max(higher);
-            }
-            i = end;
-        }
-        Envelope { bound_mm, cl_mm }
+        (Envelope { bound_mm, cl_mm }, steep)
     }
 
-    /// The bound of one pass by the steep way alone; it holds beyond the part, too.
-    pub(super) fn widened(&self, strip: &Strip, start_mm: f64, across_mm: f64, count: usize) -> Envelope {
-        let cl_mm = self.row(strip, &self.wide, start_mm, across_mm, count);
-        let mut bound_mm = vec![f64::NEG_INFINITY; count];
-        for i in 0..count {
-            for &z in &cl_mm[i.saturating_sub(1)..(i + 2).min(count)] {
-                if !z.is_nan() {
-                    bound_mm[i] = bound_mm[i].max(f64::from(z));
+    /// The wide cutter's locations at both ends of the steep intervals, block by block of columns.
+    fn steep_places(
+        &self,
+        strip: &Strip,
+        layout: &Layout,
+        passes: Range<usize>,
+        steep: &[Vec<bool>],
+    ) -> Vec<Vec<f32>> {
+        let starts: Vec<usize> = (0..layout.count).step_by(STEEP_BLOCK).collect();
+        let blocks: Vec<Vec<(usize, usize, Vec<f32>)>> = starts
+            .into_par_iter()
+            .map(|from| {
+                let to = (from + STEEP_BLOCK).min(layout.count);
+                let mut found = Vec::new();
+                for (pass, steep) in steep.iter().enumerate() {
+                    // A place is asked for by the interval before it and the one after it.
+                    let wanted =
+                        |i: &usize| (*i > 0 && steep[i - 1]) || steep.get(*i).copied().unwrap_or(false);
+                    if let Some(first) = (from..to).find(wanted) {
+                        let last = (first..to).rev().find(wanted).unwrap_or(first);
+                        found.push((pass, first, last + 1 - first));
+                    }
                 }
-            }
+                let targets: Vec<RowTarget> = found
+                    .iter()
+                    .map(|&(pass, first, count)| RowTarget {
+                        x0_mm: layout.start_mm() + first as f64 * self.pitch_mm,
+                        y_mm: layout.across_mm(passes.start + pass),
+                        count,
+                    })
+                    .collect();
+                let heights = self.targets(strip, &self.wide, &targets);
+                found.into_iter().zip(heights).map(|((pass, first, _), z)| (pass, first, z)).collect()
+            })
+            .collect();
+        let mut out: Vec<Vec<f32>> = steep.iter().map(|_| vec![f32::NAN; layout.count]).collect();
+        for (pass, first, z) in blocks.into_iter().flatten() {
+            out[pass][first..first + z.len()].copy_from_slice(&z);
         }
-        Envelope { bound_mm, cl_mm }
+        out
+    }
+
+    /// The bounds of a band's passes by the steep way alone; they hold beyond the part, too.
+    pub(super) fn widened(&self, strip: &Strip, layout: &Layout, passes: Range<usize>) -> Vec<Envelope> {
+        let wide = self.rows(strip, &self.wide, layout, passes);
+        wide.into_par_iter()
+            .map(|cl_mm| {
+                let bound_mm = (0..cl_mm.len())
+                    .map(|i| {
+                        let near = &cl_mm[i.saturating_sub(1)..(i + 2).min(cl_mm.len())];
+                        let known = near.iter().filter(|z| !z.is_nan());
+                        known.fold(f64::NEG_INFINITY, |high, &z| high.max(f64::from(z)))
+                    })
+                    .collect();
+                Envelope { bound_mm, cl_mm }
+            })
+            .collect()
     }
 
     /// Lowest height in mm at which the cutter may go straight from one place to another (along,
@@ -143,31 +217,61 @@ impl Cutter {
                 [from_mm[0] + t * du, from_mm[1] + t * dv]
             })
             .collect();
-        let drops = drop::points(&strip.heights, strip.step_mm, &self.wide, &places);
+        let drops = compensation::points(&strip.heights, &self.wide, &places);
         if drops.iter().any(|z| z.is_nan()) {
             return None;
         }
         Some(drops.into_iter().fold(f64::NEG_INFINITY, f64::max))
     }
 
-    fn row(&self, strip: &Strip, profile: &Profile, start_mm: f64, across_mm: f64, count: usize) -> Vec<f32> {
-        if (self.pitch_mm - strip.step_mm).abs() < 1e-9 {
-            return drop::row(&strip.heights, strip.step_mm, profile, start_mm, across_mm, count);
-        }
-        let places: Vec<[f64; 2]> =
-            (0..count).map(|i| [start_mm + i as f64 * self.pitch_mm, across_mm]).collect();
-        drop::points(&strip.heights, strip.step_mm, profile, &places).into_iter().map(|z| z as f32).collect()
+    fn rows(&self, strip: &Strip, profile: &Profile, layout: &Layout, passes: Range<usize>) -> Vec<Vec<f32>> {
+        let targets: Vec<RowTarget> = passes
+            .map(|k| RowTarget { x0_mm: layout.start_mm(), y_mm: layout.across_mm(k), count: layout.count })
+            .collect();
+        self.targets(strip, profile, &targets)
     }
 
-    /// What must be added to the chord where the surface stands up to `over_mm` above the tip: what
-    /// bulge and controller take beyond their shares of the budget. None where only the steep way holds.
-    fn lift_mm(&self, over_mm: f64) -> Option<f64> {
-        let tip = self.tip_mm;
-        let centre = tip - over_mm.max(0.0);
-        if centre <= 0.0 {
-            return None;
+    fn targets(&self, strip: &Strip, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+        if (self.pitch_mm - profile.step_mm()).abs() < 1e-9 {
+            return compensation::rows(&strip.heights, profile, targets);
         }
-        let contact = (tip * tip - centre * centre).max(0.0).sqrt() + self.pitch_mm;
+        let place = |t: &RowTarget, i: usize| [t.x0_mm + i as f64 * self.pitch_mm, t.y_mm];
+        targets
+            .iter()
+            .map(|t| {
+                let places: Vec<[f64; 2]> = (0..t.count).map(|i| place(t, i)).collect();
+                let drops = compensation::points(&strip.heights, profile, &places);
+                drops.into_iter().map(|z| z as f32).collect()
+            })
+            .collect()
+    }
+
+    /// How far from the tip's centre a contact that asks for more than `z_mm` can lie; None if it may lie
+    /// past the round part. A sample asks for h - r + Z, so Z > r + z - h; and only samples within that
+    /// contact's distance count, which may stand lower than the highest of all.
+    fn contact_mm(&self, ceilings: &[Ceiling], along_mm: f64, z_mm: f64) -> Option<f64> {
+        let tip = self.tip_mm;
+        // From the axis; a bull's round part begins where its flat ends.
+        let inner = if self.round_mm < tip { 0.0 } else { (self.radius_mm - tip).max(0.0) };
+        let mut farthest = f64::INFINITY;
+        for (ceiling, part) in ceilings.iter().zip(RINGS) {
+            if part < 1.0 && inner + farthest > part * self.radius_mm {
+                break;
+            }
+            let centre = tip - (ceiling.at(along_mm) - z_mm).max(0.0);
+            if centre <= 0.0 {
+                return None;
+            }
+            farthest = (tip * tip - centre * centre).max(0.0).sqrt();
+        }
+        Some(farthest)
+    }
+
+    /// What must be added to the chord for contacts up to `contact_mm` from the tip's centre: what bulge
+    /// and controller take beyond their shares of the budget. None where only the steep way holds.
+    fn lift_mm(&self, contact_mm: f64) -> Option<f64> {
+        let tip = self.tip_mm;
+        let contact = contact_mm + self.pitch_mm;
         let strayed = contact + self.budget.path_tolerance_mm;
         if strayed >= 0.99 * self.round_mm {
             return None;
@@ -178,9 +282,7 @@ impl Cutter {
             return None;
         }
         let controller_mm = self.budget.path_tolerance_mm * tip / (tip * tip - strayed * strayed).sqrt();
-        Some(
-            (bulge_mm - self.budget.raster_mm).max(0.0)
-                + (controller_mm - self.budget.controller_mm).max(0.0),
-        )
+        let bulge_lift_mm = (bulge_mm - self.budget.raster_mm).max(0.0);
+        Some(bulge_lift_mm + (controller_mm - self.budget.controller_mm).max(0.0))
     }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::envelope::Cutter;
+use super::envelope::{Cutter, Envelope};
 use super::passes::{contact_radius_mm, tip_radius_mm};
 use super::pen::Pen;
 use super::strip::{Strip, band_length};
@@ -98,7 +98,7 @@ type Run = Vec<[i32; 2]>;
 pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpath, Error> {
     let layout = layout(site, params)?;
     let lattice = site.surface.lattice();
-    let cutter = Cutter::new(params.shape, lattice.step_mm, layout.pitch_mm(), site.budget);
+    let cutter = Cutter::new(params.shape, lattice.step_mm, layout.pitch_mm(), site.budget)?;
     let stepover_mm = match layout.passes[..] {
         [first, second, ..] => f64::from(second - first) * site.unit_mm,
         _ => 2.0 * params.shape.radius_mm(),
@@ -114,10 +114,12 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
         // The link from the band before is judged in this band.
         let low_mm = layout.across_mm(first) - longest_mm;
         let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), cutter.reach_mm)?;
-        let band: Vec<Vec<Run>> = (first..=last)
+        let envelopes = cutter.envelopes(&strip, &layout, first..last + 1);
+        let band: Vec<Vec<Run>> = (first..last + 1)
             .into_par_iter()
-            .map(|k| {
-                let mut runs = pass(site, params, &layout, &cutter, &strip, k);
+            .zip(envelopes)
+            .map(|(k, envelope)| {
+                let mut runs = pass(site, params, &layout, &envelope);
                 if backwards(params.pattern, layout.along, k) {
                     runs.reverse();
                     runs.iter_mut().for_each(|run| run.reverse());
@@ -206,8 +208,7 @@ fn joints(
 }
 
 /// The cuts of one pass, towards higher coordinates.
-fn pass(site: &Site, params: &Params, layout: &Layout, cutter: &Cutter, strip: &Strip, k: usize) -> Vec<Run> {
-    let envelope = cutter.envelope(strip, layout.start_mm(), layout.across_mm(k), layout.count);
+fn pass(site: &Site, params: &Params, layout: &Layout, envelope: &Envelope) -> Vec<Run> {
     let simplify = site.budget.simplify_mm / site.unit_mm;
     let excess = 1.0 + EXCESS_MM / site.unit_mm;
     let mut out = Vec::new();

@@ -8,7 +8,6 @@
 //! Planning is in the tile's frame: X0 Y0 at its lower left corner, z = 0 at its highest design point. Only
 //! the last step, to whole units, moves z to the program's zero.
 
-mod drop;
 mod envelope;
 pub mod finish;
 mod funnel;
@@ -21,6 +20,7 @@ mod strip;
 
 pub use passes::{Axis, Layout};
 
+use crate::compensation;
 use crate::surface::{self, Surface};
 use crate::tolerance::Budget;
 
@@ -123,6 +123,8 @@ pub enum Error {
         "one band of passes needs {samples} samples in memory, at most {most} are held; hint: smaller tiles, or a larger step_mm"
     )]
     Band { samples: usize, most: usize },
+    #[error(transparent)]
+    Compensation(#[from] compensation::Error),
     #[error(transparent)]
     Surface(#[from] surface::Error),
 }

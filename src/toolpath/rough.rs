@@ -6,12 +6,12 @@
 
 use rayon::prelude::*;
 
-use super::drop::{self, Profile as DropProfile};
-use super::envelope::Cutter;
+use super::envelope::{Cutter, Envelope};
 use super::levels::{self, Profile};
 use super::pen::Pen;
 use super::strip::{Border, Strip, band_length};
 use super::{Axis, Error, Layout, Progress, Site, Toolpath, funnel};
+use crate::compensation;
 use crate::cutter::Shape;
 
 /// How far a roughing profile may stand above what is left for it, in mm besides a grid unit: what is
@@ -115,7 +115,7 @@ fn layout(site: &Site, params: &Params) -> Result<(Layout, i32), Error> {
 fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) -> Result<Plan, Error> {
     let lattice = site.surface.lattice();
     let size_mm = layout.along.split([lattice.width_mm, lattice.height_mm]);
-    let cutter = Cutter::new(params.shape, lattice.step_mm, layout.pitch_mm(), site.budget);
+    let cutter = Cutter::new(params.shape, lattice.step_mm, layout.pitch_mm(), site.budget)?;
     let stepover_mm = match layout.passes[..] {
         [first, second, ..] => f64::from(second - first) * site.unit_mm,
         _ => 0.0,
@@ -124,7 +124,7 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
     let coarse_mm = f64::from(coarse) * site.unit_mm;
     // At the middle between two rows, widened so that it answers for both and for the next place.
     let between_mm = (0.5 * stepover_mm).hypot(0.5 * coarse_mm) + site.budget.path_tolerance_mm;
-    let between = DropProfile::new(params.shape, lattice.step_mm, between_mm);
+    let between = compensation::Profile::new(params.shape, lattice.step_mm, between_mm)?;
     let reach_mm = cutter.reach_mm + between_mm;
     let border = Border::read(site.surface, layout.along, params.clear_mm.max(lattice.step_mm))?;
     let mut rows: Vec<Row> = Vec::with_capacity(layout.passes.len());
@@ -133,9 +133,11 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
         let last = first + band_length(&layout, first, lattice.step_mm, reach_mm) - 1;
         let low_mm = layout.across_mm(first) - stepover_mm;
         let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), reach_mm)?;
-        let band: Vec<Row> = (first..=last)
+        let envelopes = cutter.widened(&strip, &layout, first..last + 1);
+        let band: Vec<Row> = (first..last + 1)
             .into_par_iter()
-            .map(|k| {
+            .zip(envelopes)
+            .map(|(k, envelope)| {
                 let across_mm = layout.across_mm(k);
                 let between = between_rows(
                     site,
@@ -146,8 +148,8 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
                     across_mm - 0.5 * stepover_mm,
                     coarse,
                 );
-                let profiles =
-                    row_profiles(site, params, &layout, &cutter, &strip, &border, size_mm, across_mm);
+                let floor_mm = |along_mm| border.floor_mm(along_mm, across_mm, size_mm);
+                let profiles = row_profiles(site, params, &layout, &envelope, floor_mm);
                 Row { across: layout.passes[k], profiles, between }
             })
             .collect();
@@ -164,7 +166,7 @@ fn between_rows(
     params: &Params,
     layout: &Layout,
     strip: &Strip,
-    profile: &DropProfile,
+    profile: &compensation::Profile,
     across_mm: f64,
     coarse: i32,
 ) -> Vec<f64> {
@@ -172,25 +174,20 @@ fn between_rows(
     let places: Vec<[f64; 2]> = (0..=length / coarse + 1)
         .map(|i| [f64::from(layout.start + i * coarse) * site.unit_mm, across_mm])
         .collect();
-    drop::points(&strip.heights, strip.step_mm, profile, &places)
+    compensation::points(&strip.heights, profile, &places)
         .into_iter()
         .map(|z| if z.is_nan() { f64::NEG_INFINITY } else { site.units(z + params.stock_to_leave_mm) })
         .collect()
 }
 
 /// The profiles of one row: over the part what is to be left, around it down to the border's depth.
-#[allow(clippy::too_many_arguments)]
 fn row_profiles(
     site: &Site,
     params: &Params,
     layout: &Layout,
-    cutter: &Cutter,
-    strip: &Strip,
-    border: &Border,
-    size_mm: (f64, f64),
-    across_mm: f64,
+    envelope: &Envelope,
+    floor_mm: impl Fn(f64) -> Option<f64>,
 ) -> Vec<Profile> {
-    let envelope = cutter.widened(strip, layout.start_mm(), across_mm, layout.count);
     let wanted: Vec<f64> = envelope
         .bound_mm
         .iter()
@@ -198,8 +195,7 @@ fn row_profiles(
         .map(|(i, &bound_mm)| {
             let left_mm = bound_mm + params.stock_to_leave_mm;
             let along_mm = layout.start_mm() + i as f64 * layout.pitch_mm();
-            let floor_mm = border.floor_mm(along_mm, across_mm, size_mm).unwrap_or(f64::NEG_INFINITY);
-            site.units(left_mm.max(floor_mm))
+            site.units(left_mm.max(floor_mm(along_mm).unwrap_or(f64::NEG_INFINITY)))
         })
         .collect();
     let simplify = site.budget.simplify_mm / site.unit_mm;

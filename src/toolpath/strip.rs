@@ -17,7 +17,7 @@ const BLOCK: usize = 4;
 /// Heights in the frame of the passes: columns along, rows across.
 pub(super) struct Strip {
     pub(super) heights: Heights,
-    pub(super) step_mm: f64,
+    step_mm: f64,
     /// Maximum over BLOCK rows of each column; -inf where there is no data.
     blocks: Vec<f32>,
 }
