@@ -26,7 +26,7 @@ use crate::tolerance::Budget;
 const BULGE_MOST: f64 = 0.25;
 
 /// Distances from the axis, as parts of the radius, within which the highest sample is known.
-const RINGS: [f64; 4] = [1.0, 0.88, 0.76, 0.6];
+const RINGS: [f64; 3] = [1.0, 0.85, 0.7];
 
 /// Columns of the blocks in which steep places are evaluated together.
 const STEEP_BLOCK: usize = 256;
@@ -93,7 +93,8 @@ impl Cutter {
 
     /// The bounds of a band's passes by the better of both ways, interval by interval.
     pub(super) fn envelopes(&self, strip: &Strip, layout: &Layout, passes: Range<usize>) -> Vec<Envelope> {
-        let exact = self.rows(strip, &self.exact, layout, passes.clone());
+        let across = passes.clone().map(|k| layout.across_mm(k));
+        let exact = self.rows(strip, &self.exact, layout, across);
         if self.tip_mm <= 0.0 {
             let mut envelopes = self.widened(strip, layout, passes);
             envelopes.par_iter_mut().zip(exact).for_each(|(envelope, cl_mm)| envelope.cl_mm = cl_mm);
@@ -191,7 +192,7 @@ impl Cutter {
 
     /// The bounds of a band's passes by the steep way alone; they hold beyond the part, too.
     pub(super) fn widened(&self, strip: &Strip, layout: &Layout, passes: Range<usize>) -> Vec<Envelope> {
-        let wide = self.rows(strip, &self.wide, layout, passes);
+        let wide = self.rows(strip, &self.wide, layout, passes.map(|k| layout.across_mm(k)));
         wide.into_par_iter()
             .map(|cl_mm| {
                 let bound_mm = (0..cl_mm.len())
@@ -224,10 +225,16 @@ impl Cutter {
         Some(drops.into_iter().fold(f64::NEG_INFINITY, f64::max))
     }
 
-    fn rows(&self, strip: &Strip, profile: &Profile, layout: &Layout, passes: Range<usize>) -> Vec<Vec<f32>> {
-        let targets: Vec<RowTarget> = passes
-            .map(|k| RowTarget { x0_mm: layout.start_mm(), y_mm: layout.across_mm(k), count: layout.count })
-            .collect();
+    /// Locations of a profile along rows like those of the layout, at other places across.
+    pub(super) fn rows(
+        &self,
+        strip: &Strip,
+        profile: &Profile,
+        layout: &Layout,
+        across_mm: impl Iterator<Item = f64>,
+    ) -> Vec<Vec<f32>> {
+        let targets: Vec<RowTarget> =
+            across_mm.map(|y_mm| RowTarget { x0_mm: layout.start_mm(), y_mm, count: layout.count }).collect();
         self.targets(strip, profile, &targets)
     }
 

@@ -42,14 +42,14 @@ pub struct Params {
 struct Row {
     across: i32,
     profiles: Vec<Profile>,
-    /// Bound in units of a level link from the row before, every `Plan::coarse` units from the start.
+    /// Bound in units of a level link from the row before, over stretches of `Plan::coarse` units.
     between: Vec<f64>,
 }
 
 struct Plan {
     layout: Layout,
     rows: Vec<Row>,
-    /// Units between the places of `Row::between`.
+    /// Units of a stretch of `Row::between`, a whole number of positions.
     coarse: i32,
 }
 
@@ -120,10 +120,9 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
         [first, second, ..] => f64::from(second - first) * site.unit_mm,
         _ => 0.0,
     };
-    let coarse = ((0.5 * stepover_mm / site.unit_mm) as i32).max(layout.pitch);
-    let coarse_mm = f64::from(coarse) * site.unit_mm;
+    let coarse = ((0.25 * stepover_mm / site.unit_mm) as i32 / layout.pitch).max(1) * layout.pitch;
     // At the middle between two rows, widened so that it answers for both and for the next place.
-    let between_mm = (0.5 * stepover_mm).hypot(0.5 * coarse_mm) + site.budget.path_tolerance_mm;
+    let between_mm = (0.5 * stepover_mm).hypot(0.5 * layout.pitch_mm()) + site.budget.path_tolerance_mm;
     let between = compensation::Profile::new(params.shape, lattice.step_mm, between_mm)?;
     let reach_mm = cutter.reach_mm + between_mm;
     let border = Border::read(site.surface, layout.along, params.clear_mm.max(lattice.step_mm))?;
@@ -134,20 +133,15 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
         let low_mm = layout.across_mm(first) - stepover_mm;
         let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), reach_mm)?;
         let envelopes = cutter.widened(&strip, &layout, first..last + 1);
+        let middles = (first..last + 1).map(|k| layout.across_mm(k) - 0.5 * stepover_mm);
+        let between = cutter.rows(&strip, &between, &layout, middles);
         let band: Vec<Row> = (first..last + 1)
             .into_par_iter()
             .zip(envelopes)
-            .map(|(k, envelope)| {
+            .zip(between)
+            .map(|((k, envelope), between)| {
                 let across_mm = layout.across_mm(k);
-                let between = between_rows(
-                    site,
-                    params,
-                    &layout,
-                    &strip,
-                    &between,
-                    across_mm - 0.5 * stepover_mm,
-                    coarse,
-                );
+                let between = stretches(site, params, &between, (coarse / layout.pitch) as usize);
                 let floor_mm = |along_mm| border.floor_mm(along_mm, across_mm, size_mm);
                 let profiles = row_profiles(site, params, &layout, &envelope, floor_mm);
                 Row { across: layout.passes[k], profiles, between }
@@ -160,23 +154,16 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
     Ok(Plan { layout, rows, coarse })
 }
 
-/// How high the surface may stand between a row and the one before, in units.
-fn between_rows(
-    site: &Site,
-    params: &Params,
-    layout: &Layout,
-    strip: &Strip,
-    profile: &compensation::Profile,
-    across_mm: f64,
-    coarse: i32,
-) -> Vec<f64> {
-    let length = layout.pitch * (layout.count as i32 - 1);
-    let places: Vec<[f64; 2]> = (0..=length / coarse + 1)
-        .map(|i| [f64::from(layout.start + i * coarse) * site.unit_mm, across_mm])
-        .collect();
-    compensation::points(&strip.heights, profile, &places)
-        .into_iter()
-        .map(|z| if z.is_nan() { f64::NEG_INFINITY } else { site.units(z + params.stock_to_leave_mm) })
+/// The highest of each `length` positions and the one that follows, in units.
+fn stretches(site: &Site, params: &Params, cl_mm: &[f32], length: usize) -> Vec<f64> {
+    (0..cl_mm.len())
+        .step_by(length)
+        .map(|from| {
+            let known = cl_mm[from..(from + length + 1).min(cl_mm.len())].iter().filter(|z| !z.is_nan());
+            site.units(
+                known.fold(f64::NEG_INFINITY, |high, &z| high.max(f64::from(z))) + params.stock_to_leave_mm,
+            )
+        })
         .collect()
 }
 
@@ -285,8 +272,7 @@ fn crossing(
     let free = |u: i32| {
         let place = (u - plan.layout.start) / plan.coarse;
         let bounds = &plan.rows[k].between;
-        let near = place.max(0) as usize..((place + 2).max(0) as usize).min(bounds.len());
-        bounds[near].iter().all(|&z| z <= f64::from(above))
+        bounds.get(place.max(0) as usize).is_some_and(|&z| z <= f64::from(above))
     };
     let longest = (LONGEST_STEPOVERS * 2.0 * apart_mm / site.unit_mm) as i64;
     let length = |u: i32| i64::from(from - u).abs() + i64::from(to - u).abs();

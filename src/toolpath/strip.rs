@@ -108,32 +108,42 @@ impl Ceiling {
 
 /// The `pick` (minimum or maximum) of the values up to `reach` to either side: van Herk and Gil-Werman,
 /// three picks a value.
-fn sliding(values: &[f32], reach: usize, pick: fn(f32, f32) -> f32) -> Vec<f32> {
+fn sliding(values: &[f32], reach: usize, pick: impl Fn(f32, f32) -> f32 + Copy) -> Vec<f32> {
     let width = 2 * reach + 1;
     let count = values.len();
     let mut forward = values.to_vec();
     let mut backward = values.to_vec();
-    for i in 1..count {
-        if i % width != 0 {
-            forward[i] = pick(forward[i], forward[i - 1]);
+    for block in forward.chunks_mut(width) {
+        let mut best = block[0];
+        for z in block {
+            best = pick(best, *z);
+            *z = best;
         }
     }
-    for i in (0..count.saturating_sub(1)).rev() {
-        if (i + 1) % width != 0 {
-            backward[i] = pick(backward[i], backward[i + 1]);
+    for block in backward.chunks_mut(width) {
+        let mut best = block[block.len() - 1];
+        for z in block.iter_mut().rev() {
+            best = pick(best, *z);
+            *z = best;
         }
     }
-    (0..count)
-        .map(|i| {
-            let (low, high) = (i.saturating_sub(reach), (i + reach).min(count - 1));
-            if low / width == high / width && high - low + 1 < width {
-                // Cut off by an end: one block holds it all.
-                values[low..=high].iter().copied().fold(values[i], pick)
-            } else {
-                pick(backward[low], forward[high])
-            }
-        })
-        .collect()
+    // Cut off by an end, a window spans two blocks, or begins or ends one, or is all there is.
+    let at_end = |i: usize| {
+        let (low, high) = (i.saturating_sub(reach), (i + reach).min(count - 1));
+        if low / width != high / width {
+            pick(backward[low], forward[high])
+        } else if low % width == 0 {
+            forward[high]
+        } else {
+            values[low..=high].iter().fold(values[i], |best, &z| pick(best, z))
+        }
+    };
+    let inside = reach.min(count)..count.saturating_sub(reach).max(reach.min(count));
+    let mut out: Vec<f32> = (0..inside.start).map(at_end).collect();
+    // Here low = i - reach and high = i + reach lie in different blocks, or are one block's ends.
+    out.extend(inside.clone().map(|i| pick(backward[i - reach], forward[i + reach])));
+    out.extend((inside.end..count).map(at_end));
+    out
 }
 
 /// Lowest height near each sample of the tile's borders.
