@@ -21,6 +21,7 @@ pub mod cutter;
 pub mod grid;
 pub mod tolerance;
 pub mod optics;
+pub mod settings;
 
 pub mod screen;
 

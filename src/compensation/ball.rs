@@ -1,6 +1,5 @@
-use super::contact::Search;
-use super::field::{Field, PAD};
-use super::lanes::{LEAST, NONE};
+use super::field::Field;
+use super::lanes::{LANES, NONE};
 use super::slopes::Rises;
 
 /// Offsets d (sample less axis, in samples) at which samples can touch a ball: a box.
@@ -17,6 +16,12 @@ impl Reachable {
         (self.x[1] - self.x[0] + 0.5) * (self.y[1] - self.y[0] + 0.5)
     }
 
+    /// About how many groups of lanes its rows take.
+    #[inline(always)]
+    pub fn groups(&self) -> f64 {
+        (self.y[1] - self.y[0] + 0.5) * (1.0 + (self.x[1] - self.x[0]) / LANES as f64)
+    }
+
     #[inline(always)]
     fn is_empty(&self) -> bool {
         self.x[0] > self.x[1] || self.y[0] > self.y[1]
@@ -26,150 +31,153 @@ impl Reachable {
 /// Room for the rounding of this file's own arithmetic, in samples.
 const ROOM: f64 = 0.01;
 
-/// Rises that stand for a missing neighbour are beyond this.
-const VOID: f64 = 1e28;
-
-/// The box for samples with these rises to their next neighbours; None where none can touch.
-///
-/// With Z(d) = sqrt(R^2 - |d|^2) and a neighbour m samples on, s(d) - s(d + m e) =
-/// m (2 dx + m) / (Z(d) + Z(d + m e)), so the mean slope g to that neighbour gives
-/// dx >= g Zb - m/2 with Zb the mean of the two Z, and likewise from the one before. Zb is bounded
-/// from the box, which shrinks in a few sweeps.
-#[inline(always)]
-pub(super) fn reachable(radius: f64, step_mm: f64, slack_mm: f32, rises: Rises) -> Option<Reachable> {
-    let slopes = Slopes::of(rises, 1.0, step_mm, slack_mm);
-    // Z <= sqrt(R^2 - t^2) at the middle t of a sample and its neighbour, so |t| <= g R / sqrt(1 + g^2).
-    let far = |g: f64| {
-        if g.abs() > VOID { radius } else { g.abs() * radius / (1.0 + g * g).sqrt() + 0.5 + ROOM }
-    };
-    // Where the neighbour lies outside the cutter it bounds nothing, and with nothing known of the
-    // other axis that may be so from a sample before the axis on.
-    let start = |next: f64, before: f64| {
-        let low = if next >= 0.0 { -0.5 } else { -far(next) };
-        let high = if before <= 0.0 { 0.5 } else { far(before) };
-        [low.min(-1.0 - ROOM).max(-radius), high.max(1.0 + ROOM).min(radius)]
-    };
-    let mut at =
-        Reachable { x: start(slopes.x_next, slopes.x_before), y: start(slopes.y_next, slopes.y_before) };
-    for _ in 0..6 {
-        let before = at.lattice_points();
-        at = sweep(at, radius, 1.0, &slopes)?;
-        let now = at.lattice_points();
-        if now <= 2.6 || now > 0.9 * before {
-            break;
-        }
-    }
-    Some(at)
+/// A ball, and how exact its table is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball {
+    /// In samples.
+    pub radius: f64,
+    pub step_mm: f64,
+    /// More than rounding can shift the difference of two entries of its table.
+    pub slack_mm: f32,
 }
 
-/// Mean slopes to neighbours, widened by what rounding can do.
+/// Mean slopes to neighbours `m` samples off, widened by what rounding can do.
 struct Slopes {
+    m: f64,
     x_next: f64,
     x_before: f64,
     y_next: f64,
     y_before: f64,
 }
 
-impl Slopes {
+impl Ball {
+    /// The box for samples with these rises to their next neighbours; None where none can touch.
+    ///
+    /// With Z(d) = sqrt(R^2 - |d|^2) and a neighbour m samples on, s(d) - s(d + m e) =
+    /// m (2 dx + m) / (Z(d) + Z(d + m e)), so the mean slope g to that neighbour gives
+    /// dx >= g Zb - m/2 with Zb the mean of the two Z, and likewise from the one before. Zb is
+    /// bounded from the box, which shrinks in a few sweeps.
     #[inline(always)]
-    fn of(rises: Rises, m: f64, step_mm: f64, slack_mm: f32) -> Slopes {
-        let scale = 1.0 / (m * step_mm);
-        let give = |rise: f32| slack_mm as f64 + rise.abs() as f64 * f32::EPSILON as f64;
+    pub fn reachable(&self, rises: &Rises) -> Option<Reachable> {
+        let slopes = self.slopes(rises, 1.0);
+        // Where the neighbour lies outside the cutter it bounds nothing, and with nothing known of
+        // the other axis that may be so from a sample before the axis on.
+        let start = |next: f64, before: f64| {
+            let low = (next * self.radius).min(0.0) - 1.0 - ROOM;
+            let high = (before * self.radius).max(0.0) + 1.0 + ROOM;
+            [low.max(-self.radius), high.min(self.radius)]
+        };
+        let mut at =
+            Reachable { x: start(slopes.x_next, slopes.x_before), y: start(slopes.y_next, slopes.y_before) };
+        for _ in 0..6 {
+            let before = at.lattice_points();
+            at = self.sweep(at, &slopes)?;
+            let now = at.lattice_points();
+            if now <= 2.6 || now > 0.9 * before {
+                break;
+            }
+        }
+        Some(at)
+    }
+
+    /// Tightens the box of one sample (at padded column `i`) by neighbours further off: what tames
+    /// noise, whose next neighbours bound little.
+    pub fn far_neighbours(&self, field: &Field, a: i64, i: usize, mut at: Reachable) -> Option<Reachable> {
+        let z = field.row(a)[i];
+        let row = |a: i64| if a >= 0 && a < field.rows as i64 { field.row(a)[i] } else { NONE };
+        let beside = |i: usize| field.row(a).get(i).copied().unwrap_or(NONE);
+        for m in [2usize, 3, 4, 6, 8, 12, 16, 24, 32] {
+            if m as f64 >= self.radius {
+                break;
+            }
+            let rises = Rises {
+                x_next: beside(i + m) - z,
+                x_before: z - beside(i - m),
+                y_next: row(a + m as i64) - z,
+                y_before: z - row(a - m as i64),
+            };
+            let slopes = self.slopes(&rises, m as f64);
+            for _ in 0..2 {
+                at = self.sweep(at, &slopes)?;
+            }
+            if at.groups() < 0.4 * super::contact::WIDE {
+                break;
+            }
+        }
+        Some(at)
+    }
+
+    #[inline(always)]
+    fn slopes(&self, rises: &Rises, m: f64) -> Slopes {
+        let scale = 1.0 / (m * self.step_mm);
+        let give = |rise: f32| self.slack_mm as f64 + rise.abs() as f64 * f32::EPSILON as f64;
         Slopes {
+            m,
             x_next: (rises.x_next as f64 - give(rises.x_next)) * scale,
             x_before: (rises.x_before as f64 + give(rises.x_before)) * scale,
             y_next: (rises.y_next as f64 - give(rises.y_next)) * scale,
             y_before: (rises.y_before as f64 + give(rises.y_before)) * scale,
         }
     }
-}
 
-/// One sweep over both axes with neighbours `m` samples off.
-#[inline(always)]
-fn sweep(at: Reachable, radius: f64, m: f64, slopes: &Slopes) -> Option<Reachable> {
-    let (z_low, z_high) = mean_z(&at, radius, m);
-    let x = bound(at.x, at.y, radius, m, slopes.x_next, slopes.x_before, z_low, z_high);
-    let y = bound(at.y, at.x, radius, m, slopes.y_next, slopes.y_before, z_low, z_high);
-    let at = Reachable { x, y };
-    (!at.is_empty()).then_some(at)
-}
-
-/// Bounds on the mean of Z at a point of the box and at its neighbour.
-#[inline(always)]
-fn mean_z(at: &Reachable, radius: f64, m: f64) -> (f64, f64) {
-    let nearest = |[low, high]: [f64; 2]| {
-        if low > 0.0 {
-            low
-        } else if high < 0.0 {
-            -high
-        } else {
-            0.0
-        }
-    };
-    let farthest = |[low, high]: [f64; 2]| low.abs().max(high.abs());
-    let rr = radius * radius;
-    let (nx, ny) = (nearest(at.x), nearest(at.y));
-    let (fx, fy) = (farthest(at.x), farthest(at.y));
-    let near = ((nx * nx + ny * ny).sqrt() - 0.5 * m).max(0.0);
-    let far = (fx * fx + fy * fy).sqrt() + 0.5 * m;
-    let z_high = (rr - near * near).max(0.0).sqrt();
-    let z_mid = (rr - far * far).max(0.0).sqrt();
-    // Z is concave: the mean of two is below the middle, by at most this while the rim is far.
-    let z_low =
-        if z_mid > 0.5 * radius + m { z_mid - m * m * rr / (6.0 * z_mid * z_mid * z_mid) } else { 0.0 };
-    (z_low, z_high)
-}
-
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn bound(
-    axis: [f64; 2],
-    other: [f64; 2],
-    radius: f64,
-    m: f64,
-    next: f64,
-    before: f64,
-    z_low: f64,
-    z_high: f64,
-) -> [f64; 2] {
-    let most = other[0].abs().max(other[1].abs()).min(radius);
-    let cap = (radius * radius - most * most).sqrt() - m - ROOM;
-    let low = if next >= 0.0 { next * z_low } else { next * z_high } - 0.5 * m - ROOM;
-    let high = if before >= 0.0 { before * z_high } else { before * z_low } + 0.5 * m + ROOM;
-    [axis[0].max(low.min(cap)), axis[1].min(high.max(-cap))]
-}
-
-/// Tightens the box of one sample (at padded column `i`) by neighbours further off: what tames
-/// noise, whose next neighbours bound little.
-pub(super) fn far_neighbours(
-    field: &Field,
-    a: i64,
-    i: usize,
-    search: &Search,
-    slack_mm: f32,
-    mut at: Reachable,
-) -> Option<Reachable> {
-    let z = field.row(a)[i];
-    for m in [2usize, 3, 4, 6, 8, 12, 16, 24, 32] {
-        if m as f64 >= search.radius {
-            break;
-        }
-        let row = |a: i64| (a >= 0 && a < field.rows as i64).then(|| field.row(a)[i]).unwrap_or(NONE);
-        let beside = |i: usize| field.row(a).get(i).copied().unwrap_or(NONE);
-        let rises = Rises {
-            x_next: beside(i + m) - z,
-            x_before: z - beside(i - m),
-            y_next: row(a + m as i64) - z,
-            y_before: z - row(a - m as i64),
-        };
-        debug_assert!(z > LEAST && i >= PAD);
-        let slopes = Slopes::of(rises, m as f64, search.step_mm, slack_mm);
-        for _ in 0..2 {
-            at = sweep(at, search.radius, m as f64, &slopes)?;
-        }
-        if at.lattice_points() < 24.0 {
-            break;
-        }
+    /// One sweep over both axes.
+    #[inline(always)]
+    fn sweep(&self, at: Reachable, slopes: &Slopes) -> Option<Reachable> {
+        let z = self.mean_z(&at, slopes.m);
+        let x = self.bound(at.x, at.y, slopes.m, slopes.x_next, slopes.x_before, z);
+        let y = self.bound(at.y, at.x, slopes.m, slopes.y_next, slopes.y_before, z);
+        let at = Reachable { x, y };
+        (!at.is_empty()).then_some(at)
     }
-    Some(at)
+
+    /// Bounds on the mean of Z at a point of the box and at its neighbour. Z is concave, so the
+    /// mean is at most Z in the middle, and less by no more than m^2 R^2 / (6 Z^3) while the rim
+    /// is far.
+    #[inline(always)]
+    fn mean_z(&self, at: &Reachable, m: f64) -> [f64; 2] {
+        let half = 0.5 * m;
+        let near = |[low, high]: [f64; 2]| (low.max(-high) - half).max(0.0);
+        let far = |[low, high]: [f64; 2]| high.max(-low) + half;
+        let rr = self.radius * self.radius;
+        let (near_x, near_y, far_x, far_y) = (near(at.x), near(at.y), far(at.x), far(at.y));
+        let high = (rr - near_x * near_x - near_y * near_y).max(0.0).sqrt();
+        let middle = (rr - far_x * far_x - far_y * far_y).max(0.0).sqrt();
+        let low = if middle <= 0.5 * self.radius + m {
+            0.0
+        } else if m == 1.0 {
+            // R^2 / Z^3 < 8 / R here.
+            middle - 4.0 / (3.0 * self.radius)
+        } else {
+            middle - m * m * rr / (6.0 * middle * middle * middle)
+        };
+        [low, high]
+    }
+
+    #[inline(always)]
+    fn bound(
+        &self,
+        axis: [f64; 2],
+        other: [f64; 2],
+        m: f64,
+        next: f64,
+        before: f64,
+        [z_low, z_high]: [f64; 2],
+    ) -> [f64; 2] {
+        let most = other[1].max(-other[0]);
+        let chord_squared = (self.radius * self.radius - most * most).max(0.0);
+        // A neighbour outside the cutter bounds nothing.
+        let within_chord = |bound: f64| {
+            let outer = bound + m + ROOM;
+            if outer <= 0.0 || outer * outer <= chord_squared {
+                bound
+            } else {
+                chord_squared.sqrt() - m - ROOM
+            }
+        };
+        let z_next = if next >= 0.0 { z_low } else { z_high };
+        let z_before = if before >= 0.0 { z_high } else { z_low };
+        let low = next * z_next - 0.5 * m - ROOM;
+        let high = before * z_before + 0.5 * m + ROOM;
+        [axis[0].max(within_chord(low)), axis[1].min(-within_chord(-high))]
+    }
 }

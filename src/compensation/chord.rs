@@ -1,5 +1,5 @@
 use super::field::{Field, PAD, Targets};
-use super::lanes::{LANES, NONE, raise_both, whole_groups, widest};
+use super::lanes::{LANES, NONE, Vectors, higher, raise_both, whole_groups, widest};
 use super::pairs::Pairs;
 
 widest! {
@@ -11,7 +11,7 @@ widest! {
 }
 
 #[inline(always)]
-fn body<P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) {
+fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) {
     let levels = (2.0 * reach + 2.0).log2().floor() as usize + 1;
     let length = field.row(-1).len();
     let columns = whole_groups(out.columns);
@@ -23,13 +23,7 @@ fn body<P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) {
             let (lower, upper) = maxima[(level - 1) * length..][..2 * length].split_at_mut(length);
             // Past the end there is no data, so the last maxima are those of half the length.
             let whole = length.saturating_sub(half) / LANES * LANES;
-            for (i, to) in upper[..whole].chunks_exact_mut(LANES).enumerate() {
-                let near = &lower[i * LANES..][..LANES];
-                let far = &lower[i * LANES + half..][..LANES];
-                for lane in 0..LANES {
-                    to[lane] = if near[lane] > far[lane] { near[lane] } else { far[lane] };
-                }
-            }
+            higher::<V>(&mut upper[..whole], &lower[..whole], &lower[half..][..whole]);
             for i in whole..length {
                 let far = lower.get(i + half).copied().unwrap_or(NONE);
                 upper[i] = if lower[i] > far { lower[i] } else { far };
@@ -46,7 +40,7 @@ fn body<P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) {
             let start = PAD as i64 + pairs.shift(b);
             let near = &row[(start + lo) as usize..][..columns];
             let far = &row[(start + hi + 1 - (1i64 << level)) as usize..][..columns];
-            raise_both(&mut out.row_mut(b)[..columns], near, far);
+            raise_both::<V>(&mut out.row_mut(b)[..columns], near, far);
         }
     }
 }

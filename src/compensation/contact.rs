@@ -8,12 +8,14 @@
 //! all, to the bit. (The raster form of the contact-point search of Lou, Jiang and Scott,
 //! Proc. R. Soc. A 469 (2013) 20130150.)
 
-use super::ball::{self, Reachable};
+use super::Profile;
+use super::ball::{Ball, Reachable};
 use super::field::{Field, PAD, Targets};
-use super::lanes::{LANES, raise, whole_groups, widest};
+use super::lanes::{LANES, Vectors, raise, whole_groups, widest};
 use super::pairs::Pairs;
 use super::slopes::{CELL, Rises, RowRises};
 use super::stencil::ArcRef;
+use std::marker::PhantomData;
 
 /// Samples of a row that are first tried as one run.
 const BLOCK: usize = 4 * CELL;
@@ -21,79 +23,125 @@ const BLOCK: usize = 4 * CELL;
 /// Groups of lanes that a run may cost before it is split.
 const CHEAP: usize = 6;
 
-/// What the search needs to know of the cutter.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
-    /// Radius in samples.
-    pub radius: f64,
-    pub step_mm: f64,
-    /// A plain ball: rises bound dy as well as dx.
-    pub is_ball: bool,
-    /// The flat bottom is done by chords and left out here.
-    pub skip_flat: bool,
-}
+/// Groups of lanes from which a sample's box is worth tightening by far neighbours.
+pub(super) const WIDE: f64 = 40.0;
 
 widest! {
     /// Raises the targets by every sample of the field that can touch a cutter there.
-    fn contacts<P: Pairs>(field: &Field, pairs: &P, search: Search, out: &mut Targets) = body
+    fn contacts<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: &mut Targets) = body
 }
 
 #[inline(always)]
-fn body<P: Pairs>(field: &Field, pairs: &P, search: Search, out: &mut Targets) {
+fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: &mut Targets) {
     let with_y = pairs.is_lattice();
-    let boxed = search.is_ball && with_y;
     let mut rises = RowRises::new(field);
-    let mut run = Runs { field, pairs, search, slack_mm: pairs.slack_mm(), starts: Vec::new() };
+    let ball = Ball { radius: profile.radius(), step_mm: profile.step_mm(), slack_mm: pairs.slack_mm() };
+    let columns = rises.cells().len();
+    let mut search = Search::<V, P> {
+        field,
+        pairs,
+        ball,
+        alike_mm: (0.4 * ball.step_mm / ball.radius) as f32,
+        starts: Vec::new(),
+        known: vec![Known::default(); columns + 2],
+        known_blocks: vec![Known::default(); columns.div_ceil(BLOCK / CELL)],
+        vectors: PhantomData,
+    };
     for a in 0..field.rows as i64 {
         rises.measure(field, a, with_y);
-        run.starts.clear();
+        search.starts.clear();
         for (block, cells) in rises.cells().chunks(BLOCK / CELL).enumerate() {
             let all = cells.iter().fold(Rises::NO_SAMPLE, |all, cell| all.with(*cell));
             if all.is_no_sample() {
                 continue;
             }
             let first = block * BLOCK;
-            if boxed {
-                run.boxed_block(a, first, cells, all, out);
+            if with_y {
+                search.boxed_block(a, first, cells, all, out);
             } else {
-                run.unboxed_block(a, first, cells, all, out);
+                search.unboxed_block(a, first, cells, all, out);
             }
         }
     }
 }
 
-struct Runs<'a, P: Pairs> {
-    field: &'a Field,
-    pairs: &'a P,
-    search: Search,
-    slack_mm: f32,
-    /// Where the last block's contacts lay, by target row: the next block's lie close by.
-    starts: Vec<[i32; 2]>,
+/// The small box of some rises, kept because the next row is likely to lie on the same facet.
+#[derive(Clone, Copy)]
+struct Known {
+    rises: Rises,
+    at: Reachable,
 }
 
-impl<P: Pairs> Runs<'_, P> {
+impl Default for Known {
+    fn default() -> Known {
+        Known { rises: Rises::NO_SAMPLE, at: Reachable { x: [0.0, 0.0], y: [0.0, 0.0] } }
+    }
+}
+
+struct Search<'a, V: Vectors, P: Pairs> {
+    field: &'a Field,
+    pairs: &'a P,
+    ball: Ball,
+    /// Rises that differ by less move a contact by less than a sample.
+    alike_mm: f32,
+    /// Where the last block's contacts lay, by target row: the next block's lie close by.
+    starts: Vec<[i32; 2]>,
+    /// By cell, from the rows before; the first and last are no cell's.
+    known: Vec<Known>,
+    known_blocks: Vec<Known>,
+    vectors: PhantomData<V>,
+}
+
+impl<V: Vectors, P: Pairs> Search<'_, V, P> {
+    /// The box of rises, from `known` if they lie within its own; a box of few points is kept
+    /// there, made for rises somewhat wider.
     #[inline(always)]
-    fn reachable(&self, rises: Rises) -> Option<Reachable> {
-        ball::reachable(self.search.radius, self.search.step_mm, self.slack_mm, rises)
+    fn reachable(
+        ball: &Ball,
+        rises: &Rises,
+        known: &mut Known,
+        wider_mm: f32,
+        few: f64,
+    ) -> Option<Reachable> {
+        if known.rises.holds(rises) {
+            return Some(known.at);
+        }
+        let wider = rises.wider(wider_mm);
+        let at = ball.reachable(&wider)?;
+        if at.lattice_points() <= few {
+            *known = Known { rises: wider, at };
+        }
+        Some(at)
     }
 
     #[inline(always)]
     fn boxed_block(&mut self, a: i64, first: usize, cells: &[Rises], all: Rises, out: &mut Targets) {
-        match self.reachable(all) {
-            None => return,
-            Some(at) if at.lattice_points() <= 4.0 => {
-                return self.boxed_run(a, first, cells.len() * CELL, all, at, out);
+        let wider_mm = 0.25 * self.alike_mm;
+        let known = &mut self.known_blocks[first / BLOCK];
+        // Slopes this far apart make no small box; finding out by trying costs more.
+        let promising = all.spread() <= 4.0 * self.alike_mm;
+        if promising {
+            match Self::reachable(&self.ball, &all, known, wider_mm, 4.5) {
+                None => return,
+                Some(at) if at.lattice_points() <= 4.5 => {
+                    return self.boxed_run(a, first, cells.len() * CELL, all, at, out);
+                }
+                Some(_) => {}
             }
-            Some(_) => {}
         }
         for (c, cell) in cells.iter().enumerate() {
             if cell.is_no_sample() {
                 continue;
             }
             let first = first + c * CELL;
-            match self.reachable(*cell) {
+            if cell.spread() > 8.0 * self.alike_mm {
+                self.samples(a, first, out);
+                continue;
+            }
+            let known = &mut self.known[first / CELL + 1];
+            match Self::reachable(&self.ball, cell, known, wider_mm, 6.5) {
                 None => {}
-                Some(at) if at.lattice_points() <= 6.0 => self.boxed_run(a, first, CELL, *cell, at, out),
+                Some(at) if at.lattice_points() <= 6.5 => self.boxed_run(a, first, CELL, *cell, at, out),
                 Some(_) => self.samples(a, first, out),
             }
         }
@@ -102,9 +150,6 @@ impl<P: Pairs> Runs<'_, P> {
     /// The samples of one cell, in runs of about the same slope.
     #[inline(always)]
     fn samples(&mut self, a: i64, first: usize, out: &mut Targets) {
-        let tolerance_mm = (0.4 * self.search.step_mm / self.search.radius) as f32;
-        let alike =
-            |r: &Rises| r.x_before - r.x_next <= tolerance_mm && r.y_before - r.y_next <= tolerance_mm;
         let mut i = 0;
         while i < CELL {
             let mut rises = Rises::of(self.field, a, PAD + first + i, true);
@@ -113,15 +158,22 @@ impl<P: Pairs> Runs<'_, P> {
                 continue;
             }
             let mut end = i + 1;
-            while end < CELL && alike(&rises) {
+            while end < CELL && rises.spread() <= self.alike_mm {
                 let more = rises.with(Rises::of(self.field, a, PAD + first + end, true));
-                if !alike(&more) {
+                if more.spread() > self.alike_mm {
                     break;
                 }
                 rises = more;
                 end += 1;
             }
-            if let Some(at) = self.reachable(rises) {
+            // The facets left and right of an edge were known to the cells beside it.
+            let cell = first / CELL + 1;
+            let known = [cell - 1, cell, cell + 1].map(|at| self.known[at]);
+            let at = match known.iter().find(|known| known.rises.holds(&rises)) {
+                Some(known) => Some(known.at),
+                None => self.ball.reachable(&rises),
+            };
+            if let Some(at) = at {
                 self.boxed_run(a, first + i, end - i, rises, at, out);
             }
             i = end;
@@ -139,8 +191,8 @@ impl<P: Pairs> Runs<'_, P> {
         at: Reachable,
         out: &mut Targets,
     ) {
-        let at = if len == 1 && at.lattice_points() > 48.0 {
-            match ball::far_neighbours(self.field, a, PAD + first, &self.search, self.slack_mm, at) {
+        let at = if len == 1 && at.groups() > WIDE {
+            match self.ball.far_neighbours(self.field, a, PAD + first, at) {
                 Some(at) => at,
                 None => return,
             }
@@ -175,7 +227,7 @@ impl<P: Pairs> Runs<'_, P> {
                 hi -= 1;
             }
             if lo <= hi {
-                self.touch(a, b, &arc, first, len, lo, hi, out);
+                self.touch(a, b, &arc, first, len, [lo, hi], out);
             }
         }
     }
@@ -183,7 +235,7 @@ impl<P: Pairs> Runs<'_, P> {
     /// What a rise may be off by.
     #[inline(always)]
     fn give(&self, rise_mm: f32) -> f32 {
-        self.slack_mm + rise_mm.abs() * f32::EPSILON
+        self.ball.slack_mm + rise_mm.abs() * f32::EPSILON
     }
 
     /// Whether the next sample always beats this one at dx.
@@ -230,7 +282,7 @@ impl<P: Pairs> Runs<'_, P> {
     /// A block of which only dx is bounded: every target row in reach.
     #[inline(always)]
     fn unboxed_block(&mut self, a: i64, first: usize, cells: &[Rises], all: Rises, out: &mut Targets) {
-        let targets = self.pairs.targets(a, -self.search.radius - 1.0, self.search.radius + 1.0);
+        let targets = self.pairs.targets(a, -self.ball.radius - 1.0, self.ball.radius + 1.0);
         if self.starts.len() < targets.len() {
             self.starts.resize(targets.len(), [0, 0]);
         }
@@ -245,7 +297,7 @@ impl<P: Pairs> Runs<'_, P> {
             }
             let groups = (hi - lo + 1) as usize * (BLOCK / LANES);
             if groups <= 2 * CHEAP {
-                self.touch_outside_flat(a, b, &arc, first, cells.len() * CELL, near, out);
+                self.touch(a, b, &arc, first, cells.len() * CELL, near, out);
                 continue;
             }
             for (c, cell) in cells.iter().enumerate() {
@@ -258,7 +310,7 @@ impl<P: Pairs> Runs<'_, P> {
                 }
                 let first = first + c * CELL;
                 if (hi - lo) as usize <= CHEAP {
-                    self.touch_outside_flat(a, b, &arc, first, CELL, [lo, hi], out);
+                    self.touch(a, b, &arc, first, CELL, [lo, hi], out);
                     continue;
                 }
                 for i in first..first + CELL {
@@ -266,35 +318,11 @@ impl<P: Pairs> Runs<'_, P> {
                     if !rises.is_no_sample() {
                         let [lo, hi] = self.interval(&arc, &rises, [lo, hi]);
                         if lo <= hi {
-                            self.touch_outside_flat(a, b, &arc, i, 1, [lo, hi], out);
+                            self.touch(a, b, &arc, i, 1, [lo, hi], out);
                         }
                     }
                 }
             }
-        }
-    }
-
-    #[inline(always)]
-    fn touch_outside_flat(
-        &self,
-        a: i64,
-        b: usize,
-        arc: &ArcRef,
-        first: usize,
-        len: usize,
-        [lo, hi]: [i32; 2],
-        out: &mut Targets,
-    ) {
-        if !self.search.skip_flat || arc.arc.flat_lo > arc.arc.flat_hi {
-            return self.touch(a, b, arc, first, len, lo, hi, out);
-        }
-        let left = hi.min(arc.arc.flat_lo - 1);
-        if lo <= left {
-            self.touch(a, b, arc, first, len, lo, left, out);
-        }
-        let right = lo.max(arc.arc.flat_hi + 1);
-        if right <= hi {
-            self.touch(a, b, arc, first, len, right, hi, out);
         }
     }
 
@@ -308,8 +336,7 @@ impl<P: Pairs> Runs<'_, P> {
         arc: &ArcRef,
         first: usize,
         len: usize,
-        lo: i32,
-        hi: i32,
+        [lo, hi]: [i32; 2],
         out: &mut Targets,
     ) {
         let shift = self.pairs.shift(b);
@@ -325,7 +352,7 @@ impl<P: Pairs> Runs<'_, P> {
                 if start < end {
                     let n = whole_groups((end - start) as usize);
                     let from = &row[(PAD as i64 + start + shift + dx as i64) as usize..][..n];
-                    raise(&mut to[start as usize..][..n], from, arc.s(dx));
+                    raise::<V>(&mut to[start as usize..][..n], from, arc.s(dx));
                 }
             }
         } else {
@@ -336,7 +363,7 @@ impl<P: Pairs> Runs<'_, P> {
                 if start < end {
                     let n = whole_groups((end - start) as usize);
                     let from = &arc.values[arc.index((origin - start) as i32)..][..n];
-                    raise(&mut to[start as usize..][..n], from, row[PAD + i]);
+                    raise::<V>(&mut to[start as usize..][..n], from, row[PAD + i]);
                 }
             }
         }

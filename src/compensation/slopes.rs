@@ -45,6 +45,33 @@ impl Rises {
         }
     }
 
+    /// How far the rises differ: nothing on a plane, and less than nothing in a valley.
+    #[inline(always)]
+    pub fn spread(&self) -> f32 {
+        let (x, y) = (self.x_before - self.x_next, self.y_before - self.y_next);
+        if x > y { x } else { y }
+    }
+
+    /// Whether what these bound is bounded by the others too.
+    #[inline(always)]
+    pub fn holds(&self, other: &Rises) -> bool {
+        self.x_next <= other.x_next
+            && self.x_before >= other.x_before
+            && self.y_next <= other.y_next
+            && self.y_before >= other.y_before
+    }
+
+    /// Rises that may each be this much different.
+    #[inline(always)]
+    pub fn wider(&self, by_mm: f32) -> Rises {
+        Rises {
+            x_next: self.x_next - by_mm,
+            x_before: self.x_before + by_mm,
+            y_next: self.y_next - by_mm,
+            y_before: self.y_before + by_mm,
+        }
+    }
+
     #[inline(always)]
     pub fn is_no_sample(&self) -> bool {
         self.x_next == f32::MAX

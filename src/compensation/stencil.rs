@@ -14,6 +14,19 @@ pub(super) struct Arc {
     base: usize,
 }
 
+impl Arc {
+    /// Its columns as two spans, either of which may be empty; without those under the flat
+    /// bottom if these are to be left out.
+    #[inline(always)]
+    pub fn spans(&self, skip_flat: bool) -> [[i32; 2]; 2] {
+        if skip_flat && self.flat_lo <= self.flat_hi {
+            [[self.lo, self.flat_lo - 1], [self.flat_hi + 1, self.hi]]
+        } else {
+            [[self.lo, self.hi], [1, 0]]
+        }
+    }
+}
+
 /// s(d) in f32 on a lattice of offsets that is off the whole pitches by a fraction: entry (k, dx)
 /// is for a sample ((dx + fx), (k + fy)) pitches from the cutter's axis.
 #[derive(Clone, Debug)]

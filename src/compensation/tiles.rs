@@ -14,6 +14,9 @@ const TILE_ROWS: usize = 128;
 /// Radius of a flat bottom, in samples, from which chords are less work than single samples.
 const LEAST_CHORD: f64 = 2.0;
 
+/// Radius of a ball, in samples, from which looking for contacts is less work than every sample.
+const LEAST_SEARCH: f64 = 6.0;
+
 /// Cutter locations at the samples of `out`, which may reach past the part: the lowest z of the
 /// cutter's lowest point at which it does not cut into `h`. NaN where no data is in reach.
 pub fn cutter_location(h: &Heights, profile: &Profile, out: Window) -> Heights {
@@ -124,15 +127,9 @@ pub(super) fn dilate<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, targ
             return;
         }
     }
-    let search = contact::Search {
-        radius: profile.radius(),
-        step_mm: profile.step_mm(),
-        is_ball: profile.is_ball(),
-        skip_flat: chords,
-    };
-    if profile.radius() < 3.0 {
-        brute::every_tap(field, pairs, targets);
+    if profile.is_ball() && profile.radius() >= LEAST_SEARCH {
+        contact::contacts(field, pairs, profile, targets);
     } else {
-        contact::contacts(field, pairs, search, targets);
+        brute::every_tap(field, pairs, chords, targets);
     }
 }
