@@ -19,6 +19,7 @@
 
 pub mod cutter;
 pub mod grid;
+pub mod tolerance;
 pub mod optics;
 pub mod progress;
 pub mod settings;
