@@ -17,6 +17,7 @@
 //! Lengths are millimetres, feeds mm/min, times seconds, spindle speeds rpm; a scene is in
 //! metres. The frame is drawn in [`grid`].
 
+pub mod catalogue;
 pub mod cutter;
 pub mod grid;
 pub mod tolerance;
