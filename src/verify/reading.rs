@@ -207,9 +207,9 @@ impl Reading {
         }
     }
 
-    /// Length sums, bounds and feeds of the motions.
+    /// Length sums and bounds; RML-1's travel motions count as rapids.
     pub fn extent(&self) -> Extent {
-        let mut extent = Extent::default();
+        let mut extent = Extent::with_travel(self.travel_mm_min());
         for motion in &self.motions {
             extent.add(motion);
         }
@@ -272,6 +272,11 @@ impl Default for Extent {
 }
 
 impl Extent {
+    /// Nothing yet; feed motions at `travel_mm_min` or faster will count as rapids.
+    pub fn with_travel(travel_mm_min: Option<f32>) -> Extent {
+        Extent { travel_mm_min, ..Extent::default() }
+    }
+
     /// Takes the next motion in.
     pub fn add(&mut self, motion: &Motion) {
         let to = motion.to_mm;
