@@ -80,10 +80,18 @@ fn brute(shape: &Shape, reading: &Reading, stock: &Heights) -> (Vec<f64>, Vec<bo
 }
 
 fn cutters() -> Vec<Shape> {
-    ["ball:0.5", "flat:0.5", "bull:0.6:0.1", "bull:0.6:0.3", "vee:60:0.1:0.7", "vee:120:0:0.5", "taper:0.2:10:0.6"]
-        .iter()
-        .map(|c| c.parse().expect("a cutter"))
-        .collect()
+    [
+        "ball:0.5",
+        "flat:0.5",
+        "bull:0.6:0.1",
+        "bull:0.6:0.3",
+        "vee:60:0.1:0.7",
+        "vee:120:0:0.5",
+        "taper:0.2:10:0.6",
+    ]
+    .iter()
+    .map(|c| c.parse().expect("a cutter"))
+    .collect()
 }
 
 const WINDOW: Window = Window { column: -10, row: -15, columns: 83, rows: 71 };

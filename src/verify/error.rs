@@ -40,7 +40,9 @@ pub enum Error {
     NumberMalformed { at: Place, letter: char },
     #[error("line {line}: longer than {most} bytes; hint: is this a program?")]
     LineTooLong { line: u64, most: usize },
-    #[error("{at}: the word {letter} is not read; hint: three axes X Y Z, arcs with I J K R, words F G M N O P Q S T H")]
+    #[error(
+        "{at}: the word {letter} is not read; hint: three axes X Y Z, arcs with I J K R, words F G M N O P Q S T H"
+    )]
     Word { at: Place, letter: char },
     #[error("{at}: the code {letter}{number} is not known")]
     Code { at: Place, letter: char, number: f64 },

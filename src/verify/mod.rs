@@ -9,9 +9,11 @@ mod reading;
 mod rml;
 mod sweep;
 mod text;
+mod time;
 
 pub use error::{Error, Place};
 pub use judged::{Blank, Judged, LateralRapid};
 pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary};
 pub use sweep::{Bite, ProgramCut, Swept, sweep};
 pub use text::{language, read};
+pub use time::{Clock, Corner, Kinematics, Timing, time};

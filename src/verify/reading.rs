@@ -88,7 +88,10 @@ impl fmt::Display for Note {
                 write!(f, "line {line}: the first feed motion comes with the spindle off")
             }
             Note::LongDwell { line, seconds } => {
-                write!(f, "line {line}: a dwell of {seconds} s; hint: some controllers count P in milliseconds")
+                write!(
+                    f,
+                    "line {line}: a dwell of {seconds} s; hint: some controllers count P in milliseconds"
+                )
             }
         }
     }

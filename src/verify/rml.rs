@@ -146,7 +146,10 @@ impl Scanner<'_> {
                 }
                 while name.len() < 2 + usize::from(mark == b'!') {
                     let Some(letter) = self.letter() else {
-                        return Err(Error::Command { at, name: format!("{}{}", first as char, name.trim_start_matches('!')) });
+                        return Err(Error::Command {
+                            at,
+                            name: format!("{}{}", first as char, name.trim_start_matches('!')),
+                        });
                     };
                     name.push(letter as char);
                     self.advance()?;

@@ -108,8 +108,14 @@ pub fn sweep(stock: Heights, step_mm: f64, datum_mm: f64, programs: &[Judged]) -
             let row = window.row + (index * BAND_ROWS) as i64;
             let rows = z_mm.len() / window.columns;
             let y_mm = (0..rows).map(|r| ((row + r as i64) as f64 + 0.5) * step_mm).collect();
-            let mut band =
-                Band { z_mm, x_mm: &x_mm, y_mm, per_mm: step_mm.recip(), window: Window { row, rows, ..window }, datum_mm };
+            let mut band = Band {
+                z_mm,
+                x_mm: &x_mm,
+                y_mm,
+                per_mm: step_mm.recip(),
+                window: Window { row, rows, ..window },
+                datum_mm,
+            };
             programs
                 .iter()
                 .map(|judged| with_contact!(&judged.shape, contact => band.take(contact, judged)))
@@ -210,11 +216,7 @@ impl Band<'_> {
         let bite = |watch: &Watch| {
             (watch.motion != usize::MAX).then(|| Bite {
                 depth_mm: f64::from(watch.depth),
-                at_mm: [
-                    self.x_mm[watch.column],
-                    self.y_mm[watch.row],
-                    f64::from(watch.z) + self.datum_mm,
-                ],
+                at_mm: [self.x_mm[watch.column], self.y_mm[watch.row], f64::from(watch.z) + self.datum_mm],
                 line: motions[watch.motion].line,
                 motion: watch.motion,
                 row: self.window.row + watch.row as i64,
@@ -325,7 +327,11 @@ impl Band<'_> {
         let slope = leg.lean.m * sign;
         // Distances along the move to coordinates along the axis, in rising order.
         let interval = |low: f64, high: f64| {
-            if sign > 0.0 { (from[AXIS] + low, from[AXIS] + high) } else { (from[AXIS] - high, from[AXIS] - low) }
+            if sign > 0.0 {
+                (from[AXIS] + low, from[AXIS] + high)
+            } else {
+                (from[AXIS] - high, from[AXIS] - low)
+            }
         };
         for line in first..end {
             let at = if AXIS == 0 { self.y_mm[line] } else { self.x_mm[line] };
@@ -486,10 +492,7 @@ fn leg<C: Contact>(contact: &C, judged: &Judged, index: usize, datum_mm: f64) ->
     } else {
         Lie::Oblique
     };
-    let (u, m) = if vertical {
-        ([0.0; 2], 0.0)
-    } else {
-        ([delta[0] / length, delta[1] / length], delta[2] / length)
-    };
+    let (u, m) =
+        if vertical { ([0.0; 2], 0.0) } else { ([delta[0] / length, delta[1] / length], delta[2] / length) };
     Some(Leg { from, to, u, length, lean: contact.lean(m), lie, class })
 }

@@ -61,7 +61,9 @@ fn tells_rml(line: &[u8]) -> bool {
 fn tells_gcode(line: &[u8]) -> bool {
     match line.first().map(u8::to_ascii_uppercase) {
         Some(b'%' | b'(') => true,
-        Some(b'G' | b'M' | b'N' | b'O' | b'T') => line.get(1).is_some_and(|b| b.is_ascii_digit() || *b == b' '),
+        Some(b'G' | b'M' | b'N' | b'O' | b'T') => {
+            line.get(1).is_some_and(|b| b.is_ascii_digit() || *b == b' ')
+        }
         _ => false,
     }
 }

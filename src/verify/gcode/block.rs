@@ -164,8 +164,8 @@ impl Block {
                 }
                 self.codes[group as usize] = Some((code as u16, column));
             }
-            b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K' | b'R' | b'F' | b'S' | b'T' | b'N' | b'O' | b'P' | b'Q'
-            | b'H' | b'L' => {
+            b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K' | b'R' | b'F' | b'S' | b'T' | b'N' | b'O' | b'P'
+            | b'Q' | b'H' | b'L' => {
                 let index = (letter - b'A') as usize;
                 if self.has(letter) {
                     return Err(Error::Repeated { at, letter: letter as char });

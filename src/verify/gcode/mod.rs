@@ -56,7 +56,8 @@ pub(super) fn read(source: &mut dyn BufRead, each: &mut Sink) -> Result<Summary,
     let (mut line, mut opened, mut ended) = (0u64, false, false);
     loop {
         text.clear();
-        let taken = std::io::Read::take(&mut *source, LONGEST_LINE as u64 + 2).read_until(b'\n', &mut text)?;
+        let taken =
+            std::io::Read::take(&mut *source, LONGEST_LINE as u64 + 2).read_until(b'\n', &mut text)?;
         if taken == 0 {
             break;
         }
@@ -98,7 +99,8 @@ impl Modal {
             self.unit_mm = if code == 200 { INCH_MM } else { 1.0 };
         }
         if let Some(feed) = block.take(b'F') {
-            self.feed_mm_min = self.bounded(block, b'F', "the feed in mm/min", feed * self.unit_mm, 0.0, 1e6)?;
+            self.feed_mm_min =
+                self.bounded(block, b'F', "the feed in mm/min", feed * self.unit_mm, 0.0, 1e6)?;
         }
         if let Some(speed) = block.take(b'S') {
             self.bounded(block, b'S', "the spindle speed", speed, 0.0, 1e6)?;
@@ -215,7 +217,8 @@ impl Modal {
         let mut target = self.at_mm;
         for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
             if let Some(value) = block.take(letter) {
-                let value = self.bounded(block, letter, "the coordinate in mm", value * self.unit_mm, -1e5, 1e5)?;
+                let value =
+                    self.bounded(block, letter, "the coordinate in mm", value * self.unit_mm, -1e5, 1e5)?;
                 target[axis] = if self.relative { self.at_mm[axis] + value } else { value };
             }
         }
@@ -334,7 +337,8 @@ impl Modal {
         for i in 0..2 {
             let value = block.take(letters[i]).map(|v| v * self.unit_mm);
             let from = start[axes[i]];
-            centre[i] = if self.centre_absolute { value.unwrap_or(from) } else { from + value.unwrap_or(0.0) };
+            centre[i] =
+                if self.centre_absolute { value.unwrap_or(from) } else { from + value.unwrap_or(0.0) };
         }
         let turns = block.take(b'P').unwrap_or(1.0);
         self.bounded(block, b'P', "the number of turns", turns, 1.0, 1000.0)?;
