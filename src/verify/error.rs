@@ -86,10 +86,8 @@ pub enum Error {
     Count { at: Place, command: &'static str, found: usize, wanted: &'static str },
     #[error("{at}: {value} is not a whole number of units; hint: controllers may drop the fraction")]
     Fraction { at: Place, value: f64 },
-    #[error(
-        "{at}: {command} belongs to mode {mode}, the text began in mode {began}; hint: in mode 1 write ^{command} for a mode 2 command"
-    )]
-    Mode { at: Place, command: &'static str, mode: u8, began: u8 },
+    #[error("{at}: {command} belongs to mode {mode}, the text began in mode {began}; hint: {hint}")]
+    Mode { at: Place, command: &'static str, mode: u8, began: u8, hint: String },
     #[error("{at}: the last command has no terminator; hint: end the text with ; or a new line")]
     Terminator { at: Place },
     #[error("{at}: {command} moves before {speed} named a speed")]

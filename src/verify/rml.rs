@@ -263,7 +263,12 @@ impl Machine {
         if command.mode != 0 {
             let began = *self.began.get_or_insert(command.mode);
             if began != command.mode {
-                return Err(Error::Mode { at, command: name, mode: command.mode, began });
+                let hint = if began == 1 {
+                    format!("in mode 1 write ^{name} for a mode 2 command")
+                } else {
+                    "stay in mode 2".to_string()
+                };
+                return Err(Error::Mode { at, command: name, mode: command.mode, began, hint });
             }
         }
         let count = |allowed: fn(usize) -> bool, wanted: &'static str| {
