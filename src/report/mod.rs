@@ -1,1 +1,24 @@
-//! Everything shown, nothing computed: JSON, maps, pages.
+//! Everything shown, nothing computed: JSON, maps and their pictures, lists of cavities, pages.
+
+pub mod cavity_list;
+pub mod files;
+pub mod maps;
+pub mod schema;
+
+pub use files::{write_json, write_whole};
+pub use schema::{
+    Bounds, ByCause, Fidelity, Finding, GougeBudget, Light, MapFiles, Part, Parts, Program, Report, Severity,
+    Tile, Times, Verdict, finding,
+};
+
+/// Why something could not be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    #[error("{path}: {source}; hint: the output folder must be writable and have room")]
+    Io { path: String, source: std::io::Error },
+    #[error(
+        "a strip of {samples} samples was given for rows of {columns} columns with {rows_left} rows left; \
+         hint: every layer must be of the same tile"
+    )]
+    Strip { samples: usize, columns: usize, rows_left: usize },
+}

@@ -1,0 +1,363 @@
+//! Deviation of the machined surface from the design, counted block by block.
+
+use std::f64::consts::FRAC_PI_4;
+
+use super::histogram::Histogram;
+use crate::grid::{Heights, Window};
+
+/// |deviation| is counted in nanometres.
+const DEVIATION_QUANTUM_MM: f64 = 1e-6;
+/// Normals' errors are counted in hundred-thousandths of a degree.
+const ANGLE_QUANTUM_DEG: f64 = 1e-5;
+/// Sums are kept in whole 2^-40 mm, so that the order of adding cannot change them.
+pub(super) const SUM_UNITS_PER_MM: f64 = (1u64 << 40) as f64;
+
+/// What changes the answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Params {
+    /// Distance between samples in mm.
+    pub step_mm: f64,
+    /// The job's limit on |deviation| in mm, when it has one.
+    pub limit_mm: Option<f64>,
+}
+
+/// The surfaces of one block, each in mm and in a window of its own that covers the block. `design` and
+/// `machined` should reach one sample further on every side where the tile goes on (central differences).
+#[derive(Clone, Copy, Debug)]
+pub struct Layers<'a> {
+    pub design: &'a Heights,
+    /// Read back from the program text.
+    pub machined: &'a Heights,
+    /// Minimum over the job's cutters of the closing, less the design; never negative.
+    pub cavity: Option<&'a Heights>,
+    /// What the finishing passes leave before any rounding to the controller's grid.
+    pub passes: Option<&'a Heights>,
+}
+
+/// A sample and its figure, e.g. the deepest gouge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub mm: f64,
+    pub column: i64,
+    pub row: i64,
+}
+
+impl Place {
+    /// x and y of the sample in the part frame.
+    pub fn where_mm(&self, step_mm: f64) -> [f64; 2] {
+        [(self.column as f64 + 0.5) * step_mm, (self.row as f64 + 0.5) * step_mm]
+    }
+
+    /// The larger figure; on ties the lower row, then the lower column.
+    fn larger(a: Option<Place>, b: Option<Place>) -> Option<Place> {
+        match (a, b) {
+            (Some(x), Some(y)) if y.mm > x.mm || (y.mm == x.mm && (y.row, y.column) < (x.row, x.column)) => b,
+            (None, _) => b,
+            _ => a,
+        }
+    }
+}
+
+/// Area means in mm that add up to the mean deviation, over the samples where every layer has data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByCause {
+    /// Cavity. `None` when no cavity layer was given; then `scallop` holds it too.
+    pub unreachable_mm: Option<f64>,
+    /// Exact passes less the closing.
+    pub scallop_mm: f64,
+    /// Read-back less exact passes. `None` when no passes were given; then `scallop` holds it too.
+    pub rounding_mm: Option<f64>,
+}
+
+/// The figures of a tile or a part. `None` where nothing was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figures {
+    /// Samples with a design and a machined height.
+    pub samples: u64,
+    /// Samples with a design but no machined height: they are judged by nothing.
+    pub unjudged: u64,
+    /// The largest negative deviation as a positive number; 0 without one.
+    pub gouge_max_mm: f64,
+    pub gouge_where_mm: Option<[f64; 2]>,
+    pub excess_max_mm: f64,
+    pub excess_where_mm: Option<[f64; 2]>,
+    pub deviation_mean_mm: Option<f64>,
+    pub deviation_p50_mm: Option<f64>,
+    pub deviation_p99_mm: Option<f64>,
+    /// Part of the samples with |deviation| at most the limit, counted exactly; `None` without a limit.
+    pub within_limit_fraction: Option<f64>,
+    pub normal_p50_deg: Option<f64>,
+    pub normal_p95_deg: Option<f64>,
+    /// Part of the samples where a cavity of more than 1 um is left.
+    pub cavity_area_fraction: Option<f64>,
+    pub cavity_max_depth_mm: Option<f64>,
+    pub by_cause: Option<ByCause>,
+}
+
+/// A sample counts as cavity above this depth in mm.
+pub const CAVITY_THRESHOLD_MM: f64 = 0.001;
+
+/// Everything counted so far. Tallies of any blocks merge in any order to the same bits.
+///
+/// Deviation = machined - design. Percentiles of |deviation| are read from a histogram of 1 nm up to 1.05 mm
+/// and of one part in 500,000 above; those of the normals' error from 1e-5 degrees up to 10 degrees, one part in
+/// 500,000 above. Gouge, excess and the part within the limit are exact. No data (NaN or infinite) in design or
+/// machined leaves a sample out.
+///
+/// A normal is (-dz/dx, -dz/dy, 1) by central differences at the raster step. Where one neighbour has no data
+/// in either surface (a tile's edge) both surfaces use the one-sided difference; a sample without a neighbour on
+/// both sides of an axis has no normal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tally {
+    params: Params,
+    samples: u64,
+    unjudged: u64,
+    within: u64,
+    gouge: Option<Place>,
+    excess: Option<Place>,
+    deviation: Histogram,
+    deviation_sum: i128,
+    normals: Histogram,
+    cavity_samples: u64,
+    cavity_above: u64,
+    cavity_max_mm: f64,
+    cause_samples: u64,
+    cause_sums: [i128; 3],
+    has_cavity: bool,
+    has_passes: bool,
+}
+
+impl Tally {
+    /// Nothing counted yet.
+    pub fn new(params: Params) -> Tally {
+        Tally {
+            params,
+            samples: 0,
+            unjudged: 0,
+            within: 0,
+            gouge: None,
+            excess: None,
+            deviation: Histogram::default(),
+            deviation_sum: 0,
+            normals: Histogram::default(),
+            cavity_samples: 0,
+            cavity_above: 0,
+            cavity_max_mm: 0.0,
+            cause_samples: 0,
+            cause_sums: [0; 3],
+            has_cavity: false,
+            has_passes: false,
+        }
+    }
+
+    /// Counts the samples of `block`, whose columns and rows are the part's.
+    pub fn add(&mut self, block: Window, layers: Layers) -> Result<(), super::Error> {
+        covers("design", layers.design, block)?;
+        covers("machined", layers.machined, block)?;
+        layers.cavity.map_or(Ok(()), |cavity| covers("cavity", cavity, block))?;
+        layers.passes.map_or(Ok(()), |passes| covers("passes", passes, block))?;
+        self.has_cavity |= layers.cavity.is_some();
+        self.has_passes |= layers.passes.is_some();
+        for row in block.row..block.row_end() {
+            self.add_row(block, row, &layers);
+            self.add_normals(block, row, layers.design, layers.machined);
+        }
+        Ok(())
+    }
+
+    fn add_row(&mut self, block: Window, row: i64, layers: &Layers) {
+        let design = part_of_row(layers.design, block, row);
+        let machined = part_of_row(layers.machined, block, row);
+        let cavity = layers.cavity.map(|heights| part_of_row(heights, block, row));
+        let passes = layers.passes.map(|heights| part_of_row(heights, block, row));
+        for i in 0..block.columns {
+            let cavity_mm = cavity.map_or(0.0, |cavity| f64::from(cavity[i]));
+            if cavity.is_some() && cavity_mm.is_finite() {
+                self.cavity_samples += 1;
+                self.cavity_above += u64::from(cavity_mm > CAVITY_THRESHOLD_MM);
+                self.cavity_max_mm = self.cavity_max_mm.max(cavity_mm);
+            }
+            let (design_mm, machined_mm) = (f64::from(design[i]), f64::from(machined[i]));
+            let deviation_mm = machined_mm - design_mm;
+            if !deviation_mm.is_finite() {
+                self.unjudged += u64::from(design_mm.is_finite());
+                continue;
+            }
+            let sum = to_sum(deviation_mm);
+            self.samples += 1;
+            self.deviation_sum += i128::from(sum);
+            self.deviation.add(deviation_mm.abs() / DEVIATION_QUANTUM_MM);
+            self.within += u64::from(self.params.limit_mm.is_some_and(|limit| deviation_mm.abs() <= limit));
+            let place = Place { mm: deviation_mm.abs(), column: block.column + i as i64, row };
+            if deviation_mm < 0.0 && self.gouge.is_none_or(|gouge| place.mm >= gouge.mm) {
+                self.gouge = Place::larger(self.gouge, Some(place));
+            } else if deviation_mm > 0.0 && self.excess.is_none_or(|excess| place.mm >= excess.mm) {
+                self.excess = Place::larger(self.excess, Some(place));
+            }
+            let rounding_mm = passes.map_or(0.0, |passes| machined_mm - f64::from(passes[i]));
+            if cavity_mm.is_finite() && rounding_mm.is_finite() {
+                let (unreachable, rounding) = (to_sum(cavity_mm), to_sum(rounding_mm));
+                self.cause_samples += 1;
+                self.cause_sums[0] += i128::from(unreachable);
+                // What the other two leave, so that the three add up to the bit.
+                self.cause_sums[1] += i128::from(sum - unreachable - rounding);
+                self.cause_sums[2] += i128::from(rounding);
+            }
+        }
+    }
+
+    fn add_normals(&mut self, block: Window, row: i64, design: &Heights, machined: &Heights) {
+        let (Some(design), Some(machined)) =
+            (Stencil::at(design, block, row), Stencil::at(machined, block, row))
+        else {
+            return;
+        };
+        for i in 0..block.columns {
+            if !(design.centre(i) - machined.centre(i)).is_finite() {
+                continue;
+            }
+            let design_around = design.around(i);
+            let machined_around = machined.around(i);
+            let slope = |low: usize| {
+                let a = difference(&design_around, &machined_around, low, design.centre(i))?;
+                let b = difference(&machined_around, &design_around, low, machined.centre(i))?;
+                Some((a / self.params.step_mm, b / self.params.step_mm))
+            };
+            if let (Some((ax, bx)), Some((ay, by))) = (slope(0), slope(2)) {
+                self.normals.add(angle_key([ax, ay], [bx, by]));
+            }
+        }
+    }
+
+    /// Takes over everything another tally counted with the same parameters.
+    pub fn merge(&mut self, other: &Tally) {
+        debug_assert_eq!(self.params, other.params);
+        self.samples += other.samples;
+        self.unjudged += other.unjudged;
+        self.within += other.within;
+        self.gouge = Place::larger(self.gouge, other.gouge);
+        self.excess = Place::larger(self.excess, other.excess);
+        self.deviation.merge(&other.deviation);
+        self.deviation_sum += other.deviation_sum;
+        self.normals.merge(&other.normals);
+        self.cavity_samples += other.cavity_samples;
+        self.cavity_above += other.cavity_above;
+        self.cavity_max_mm = self.cavity_max_mm.max(other.cavity_max_mm);
+        self.cause_samples += other.cause_samples;
+        for (mine, theirs) in self.cause_sums.iter_mut().zip(other.cause_sums) {
+            *mine += theirs;
+        }
+        self.has_cavity |= other.has_cavity;
+        self.has_passes |= other.has_passes;
+    }
+
+    /// What was counted, as figures.
+    pub fn figures(&self) -> Figures {
+        let step_mm = self.params.step_mm;
+        let fraction = |part: u64, of: u64| (of > 0).then(|| part as f64 / of as f64);
+        let mean = |sum: i128, of: u64| (of > 0).then(|| sum as f64 / SUM_UNITS_PER_MM / of as f64);
+        let percentile = |p: f64| self.deviation.percentile(p).map(|quanta| quanta * DEVIATION_QUANTUM_MM);
+        let normal = |p: f64| self.normals.percentile(p).map(angle_of_key);
+        let cause = |index: usize| mean(self.cause_sums[index], self.cause_samples);
+        Figures {
+            samples: self.samples,
+            unjudged: self.unjudged,
+            gouge_max_mm: self.gouge.map_or(0.0, |place| place.mm),
+            gouge_where_mm: self.gouge.map(|place| place.where_mm(step_mm)),
+            excess_max_mm: self.excess.map_or(0.0, |place| place.mm),
+            excess_where_mm: self.excess.map(|place| place.where_mm(step_mm)),
+            deviation_mean_mm: mean(self.deviation_sum, self.samples),
+            deviation_p50_mm: percentile(0.50),
+            deviation_p99_mm: percentile(0.99),
+            within_limit_fraction: self.params.limit_mm.and_then(|_| fraction(self.within, self.samples)),
+            normal_p50_deg: normal(0.50),
+            normal_p95_deg: normal(0.95),
+            cavity_area_fraction: fraction(self.cavity_above, self.cavity_samples),
+            cavity_max_depth_mm: (self.cavity_samples > 0).then_some(self.cavity_max_mm),
+            by_cause: cause(1).map(|scallop_mm| ByCause {
+                unreachable_mm: cause(0).filter(|_| self.has_cavity),
+                scallop_mm,
+                rounding_mm: cause(2).filter(|_| self.has_passes),
+            }),
+        }
+    }
+}
+
+/// Rounded to the sums' unit; differences of real surfaces are far below the 8 km at which this saturates.
+pub(super) fn to_sum(mm: f64) -> i64 {
+    (mm * SUM_UNITS_PER_MM).round() as i64
+}
+
+pub(super) fn covers(layer: &'static str, heights: &Heights, block: Window) -> Result<(), super::Error> {
+    if heights.window.intersection(&block) == Some(block) {
+        return Ok(());
+    }
+    Err(super::Error::Uncovered { layer, has: heights.window, needs: block })
+}
+
+/// The block's samples of one row.
+pub(super) fn part_of_row(heights: &Heights, block: Window, row: i64) -> &[f32] {
+    &heights.row(row)[(block.column - heights.window.column) as usize..][..block.columns]
+}
+
+/// Three rows of a surface, the middle one being judged.
+struct Stencil<'a> {
+    rows: [Option<&'a [f32]>; 3],
+    offset: usize,
+}
+
+impl<'a> Stencil<'a> {
+    fn at(heights: &'a Heights, block: Window, row: i64) -> Option<Stencil<'a>> {
+        let held = |row: i64| {
+            (row >= heights.window.row && row < heights.window.row_end()).then(|| heights.row(row))
+        };
+        let rows = [held(row - 1), held(row), held(row + 1)];
+        rows[1].map(|_| Stencil { rows, offset: (block.column - heights.window.column) as usize })
+    }
+
+    fn sample(&self, row: usize, column: Option<usize>) -> f64 {
+        self.rows[row].and_then(|row| row.get(column?)).map_or(f64::NAN, |&z| f64::from(z))
+    }
+
+    fn centre(&self, i: usize) -> f64 {
+        self.sample(1, Some(self.offset + i))
+    }
+
+    /// Left, right, below, above; NaN where there is none.
+    fn around(&self, i: usize) -> [f64; 4] {
+        let column = self.offset + i;
+        [
+            self.sample(1, column.checked_sub(1)),
+            self.sample(1, Some(column + 1)),
+            self.sample(0, Some(column)),
+            self.sample(2, Some(column)),
+        ]
+    }
+}
+
+/// Rise per step along one axis, by the neighbours `low` and `low + 1` that both surfaces have.
+fn difference(mine: &[f64; 4], theirs: &[f64; 4], low: usize, centre: f64) -> Option<f64> {
+    let usable = |index: usize| mine[index].is_finite() && theirs[index].is_finite();
+    match (usable(low), usable(low + 1)) {
+        (true, true) => Some(0.5 * (mine[low + 1] - mine[low])),
+        (true, false) => Some(centre - mine[low]),
+        (false, true) => Some(mine[low + 1] - centre),
+        (false, false) => None,
+    }
+}
+
+/// A figure that grows with the angle between two normals and needs no arc tangent below 45 degrees: the
+/// tangent there, 1 plus the rest of the angle above, in quanta.
+fn angle_key([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
+    let (u, v, w) = (ax - bx, ay - by, ax * by - ay * bx);
+    let cross = (u * u + v * v + w * w).sqrt();
+    let dot = ax * bx + ay * by + 1.0;
+    let key = if cross < dot { cross / dot } else { 1.0 + (cross.atan2(dot) - FRAC_PI_4) };
+    key / ANGLE_QUANTUM_DEG.to_radians()
+}
+
+/// The angle in degrees of an [`angle_key`].
+fn angle_of_key(quanta: f64) -> f64 {
+    let key = quanta * ANGLE_QUANTUM_DEG.to_radians();
+    if key < 1.0 { key.atan().to_degrees() } else { (FRAC_PI_4 + key - 1.0).to_degrees() }
+}
