@@ -44,3 +44,5 @@ pub mod fidelity;
 pub mod report;
 
 pub mod job;
+
+pub mod pipeline;

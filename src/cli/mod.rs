@@ -6,6 +6,10 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod console;
+mod mill;
+mod staging;
+
 /// Directional projection screens and other reliefs, from design to proved programs.
 #[derive(Parser)]
 #[command(name = "screenmill", version, max_term_width = 100)]
@@ -34,7 +38,9 @@ pub struct Common {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Mill(mill::Arguments),
+}
 
 /// How a command that was not refused ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +64,14 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     }
-    let outcome: Result<Outcome, Refusal> = match arguments.command {};
-    #[allow(unreachable_code)]
+    if let Err(error) = console::listen_for_interrupt() {
+        eprintln!("error: {error}");
+        return ExitCode::from(2);
+    }
+    let common = &arguments.common;
+    let outcome: Result<Outcome, Refusal> = match arguments.command {
+        Command::Mill(arguments) => mill::run(arguments, common),
+    };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,
         Ok(Outcome::Found) => ExitCode::from(1),
@@ -67,5 +79,15 @@ pub fn run() -> ExitCode {
             eprintln!("error: {refusal}");
             ExitCode::from(2)
         }
+    }
+}
+
+/// A machine time as an operator reads it.
+fn hours(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
     }
 }

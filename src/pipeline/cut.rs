@@ -39,7 +39,7 @@ pub struct TileResult {
     pub lateral_rapids: Vec<Vec<Option<LateralRapid>>>,
     pub maps: crate::report::MapFiles,
     pub map_factor: usize,
-    pub light: Option<crate::report::Light>,
+    /// Names of the cutters that were tried on the cavities, largest first.
     pub candidates: Vec<String>,
 }
 
@@ -157,14 +157,30 @@ fn judged(
     let mut maps = Maps::create(staging, &tile.setup.tile.name, &lattice, job.maps.full, offset_mm)?;
     let verdict = judge(&case, progress, &mut |strip| maps.push(&strip))?;
     progress.begin("maps", 1);
-    let limit_mm = job.limits.deviation_or_default_mm();
-    let (maps, map_factor) = maps.finish(limit_mm)?;
-    let light = sight.as_ref().and_then(|sight| {
-        let view = sight.view(&lattice);
-        super::light::summary(&verdict.light_designed, verdict.light_machined.first()?, &view)
-    });
+    let at = &tile.setup.tile;
+    let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;
     drop(judged);
-    Ok(TileResult { tile, posts, verdict, lateral_rapids, maps, map_factor, light, candidates: names })
+    Ok(TileResult { tile, posts, verdict, lateral_rapids, maps, map_factor, candidates: names })
+}
+
+/// What a picture says at its foot.
+fn notes(job: &Job, verdict: &Verdict) -> Vec<String> {
+    let figures = verdict.tallies[0].figures();
+    let um = |mm: f64| format!("{:.1} um", mm * 1e3);
+    vec![
+        format!(
+            "sampled every {} um, judged on the read-back programs; deepest gouge {} of {} allowed",
+            job.part.step_mm * 1e3,
+            um(figures.gouge_max_mm),
+            um(job.limits.gouge_or_default_mm())
+        ),
+        format!(
+            "99 % of the area within {}; {} cavities deeper than 1 um on {:.2} % of it",
+            um(figures.deviation_p99_mm.unwrap_or_default()),
+            verdict.cavities.count,
+            100.0 * figures.cavity_area_fraction.unwrap_or_default()
+        ),
+    ]
 }
 
 /// The metal around a tile, in the tile's frame.
@@ -206,6 +222,11 @@ impl TileResult {
     /// The figures of a post, by default the first.
     pub fn tally(&self, post: usize) -> &Tally {
         &self.verdict.tallies[post]
+    }
+
+    /// A place of the tile's frame in the part's.
+    pub fn in_part(&self, place_mm: [f64; 2]) -> [f64; 2] {
+        [self.tile.setup.tile.x_mm + place_mm[0], self.tile.setup.tile.y_mm + place_mm[1]]
     }
 
     /// The folder that a program is moved to when it must not be run.

@@ -10,6 +10,8 @@ pub enum Error {
     #[error(transparent)]
     Screen(#[from] crate::screen::Error),
     #[error(transparent)]
+    Container(#[from] crate::screen::ContainerError),
+    #[error(transparent)]
     Surface(#[from] crate::surface::Error),
     #[error(transparent)]
     Compensation(#[from] crate::compensation::Error),

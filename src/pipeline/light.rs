@@ -30,19 +30,23 @@ impl Sight<'_> {
         };
         tally.add(heights, window, step_mm, &self.pose, &room);
     }
+}
 
-    /// The mean view of the audience from the tile.
-    pub fn view(&self, lattice: &Lattice) -> View {
-        let place = |i: usize, length_mm: f64| (i as f64 + 0.5) / POINTS as f64 * length_mm;
-        let points: Vec<DVec3> = (0..POINTS * POINTS)
-            .map(|k| {
-                let x_mm = place(k % POINTS, lattice.width_mm);
-                let y_mm = place(k / POINTS, lattice.height_mm);
-                self.pose.point_m(DVec3::new(x_mm, y_mm, 0.0))
-            })
-            .collect();
-        View::from_points(&points, &|point, out| self.scene.audience_hit(point, out))
-    }
+/// Points of a tile from which the audience is looked at, in metres of the screen's frame.
+pub fn points(pose: &Pose, lattice: &Lattice) -> Vec<DVec3> {
+    let place = |i: usize, length_mm: f64| (i as f64 + 0.5) / POINTS as f64 * length_mm;
+    (0..POINTS * POINTS)
+        .map(|k| {
+            let x_mm = place(k % POINTS, lattice.width_mm);
+            let y_mm = place(k / POINTS, lattice.height_mm);
+            pose.point_m(DVec3::new(x_mm, y_mm, 0.0))
+        })
+        .collect()
+}
+
+/// The mean view of the audience from these points.
+pub fn view(scene: &Scene, points_m: &[DVec3]) -> View {
+    View::from_points(points_m, &|point, out| scene.audience_hit(point, out))
 }
 
 /// The figures of `report.json` for a design and its cut.
@@ -57,9 +61,9 @@ pub fn summary(designed: &LightTally, machined: &LightTally, view: &View) -> Opt
         absorbed_machined: after.absorbed,
         unresolved_designed: before.unresolved,
         unresolved_machined: after.unresolved,
-        gain_designed: designed.gain(view)?,
-        gain_machined: machined.gain(view)?,
-        uniformity_designed: designed.uniformity(view)?,
-        uniformity_machined: machined.uniformity(view)?,
+        gain_designed: designed.gain(view),
+        gain_machined: machined.gain(view),
+        uniformity_designed: designed.uniformity(view),
+        uniformity_machined: machined.uniformity(view),
     })
 }

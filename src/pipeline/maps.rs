@@ -12,7 +12,6 @@ use crate::surface::HeightWriter;
 pub struct Maps {
     folder: PathBuf,
     tile: String,
-    lattice: Lattice,
     offset_mm: f64,
     reducer: Reducer,
     writers: Vec<HeightWriter>,
@@ -45,7 +44,7 @@ impl Maps {
             })
             .collect::<Result<_, _>>()?;
         let preview = Preview::new(reducer.columns(), reducer.rows(), pitch_mm);
-        Ok(Maps { folder, tile: tile.into(), lattice: *lattice, offset_mm, reducer, writers, preview })
+        Ok(Maps { folder, tile: tile.into(), offset_mm, reducer, writers, preview })
     }
 
     /// Takes the next full rows of the tile.
@@ -69,17 +68,22 @@ impl Maps {
     }
 
     /// Gives the maps their names, draws their pictures, and tells by which whole factor they are reduced.
-    pub fn finish(self, origin_mm: [f64; 2], notes: &[String]) -> Result<(MapFiles, usize), Error> {
+    pub fn finish(
+        self,
+        part: &str,
+        origin_mm: [f64; 2],
+        notes: &[String],
+    ) -> Result<(MapFiles, usize), Error> {
         for writer in self.writers {
             writer.finish()?;
         }
         let factor = self.reducer.factor();
         for kind in Picture::ALL {
             let caption = Caption {
+                part: part.into(),
                 tile: self.tile.clone(),
                 origin_mm,
                 notes: notes.to_vec(),
-                ..Caption::default()
             };
             let path = self.folder.join(format!("{}-{}.png", self.tile, kind.name()));
             report::write_png(&path, &self.preview.draw(kind, &caption))?;

@@ -12,6 +12,7 @@ mod cut;
 mod error;
 mod judge;
 mod light;
+mod maps;
 mod part;
 mod plan;
 mod report;

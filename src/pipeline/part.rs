@@ -99,7 +99,7 @@ impl Part {
             (Some(path), _) => {
                 let scene = Scene::read(path)?;
                 let elevation = match &spec.elevation {
-                    Some(path) => Some(screen::Elevation::read(path, &scene)?),
+                    Some(path) => Some(screen::Elevation::read(path)?),
                     None => None,
                 };
                 progress.begin("design", 1);
