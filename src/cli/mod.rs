@@ -1,6 +1,9 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod part;
+mod raster;
+
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -40,6 +43,7 @@ pub struct Common {
 #[derive(Subcommand)]
 enum Command {
     Mill(mill::Arguments),
+    Raster(raster::Arguments),
 }
 
 /// How a command that was not refused ended.
@@ -71,6 +75,8 @@ pub fn run() -> ExitCode {
     let common = &arguments.common;
     let outcome: Result<Outcome, Refusal> = match arguments.command {
         Command::Mill(arguments) => mill::run(arguments, common),
+    let outcome: Result<Outcome, Refusal> = match arguments.command {
+        Command::Raster(of) => raster::run(&of, &arguments.common),
     };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,
