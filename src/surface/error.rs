@@ -1,3 +1,5 @@
+use crate::screen::ContainerError;
+
 /// Why a surface was refused, or a height file could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -11,6 +13,12 @@ pub enum Error {
     PartKind { path: String, extension: String },
     #[error("{path}: heights are not written as \".{extension}\"; hint: .tif, .npy or .png")]
     OutputKind { path: String, extension: String },
+    #[error(transparent)]
+    Container(#[from] ContainerError),
+    #[error("\"{text}\" is no unit of a mesh; hint: mm, m or inch")]
+    UnitName { text: String },
+    #[error("\"{text}\" is no axis; hint: x, y or z, the one that points out of the stock")]
+    UpName { text: String },
     #[error("the step is {step_mm} mm; hint: a length above 0, as --step-mm 0.01")]
     Step { step_mm: f64 },
     #[error("the pixel size is {pixel_mm} mm; hint: a length above 0, as --pixel-mm 0.01")]

@@ -254,7 +254,7 @@ impl HeightImage {
                     *z = (height - datum_mm) as f32;
                 }
             }
-            Ok(())
+            Ok::<(), Error>(())
         })?;
         Ok(heights)
     }

@@ -1,9 +1,11 @@
 //! Any part by its file name.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::image::{self, Format, Said};
-use super::{Error, Surface, Unit, Up, stl};
+use super::{Designed, Error, Surface, Unit, Up, stl};
+use crate::screen::Design;
 
 /// What the user says beside the file's name.
 #[derive(Clone, Debug)]
@@ -54,6 +56,10 @@ pub fn open(path: &Path, options: &Options) -> Result<Opened, Error> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let mut notes = Vec::new();
     let format = match extension.as_str() {
+        "npz" => {
+            let surface = Designed::whole(Arc::new(Design::read(path)?), step_mm)?;
+            return Ok(Opened { surface: Box::new(surface), kind: Kind::Design, notes });
+        }
         "stl" => {
             let mesh = stl::read(path, options.unit, options.up, step_mm, &mut notes)?;
             return Ok(Opened { surface: Box::new(mesh), kind: Kind::Mesh, notes });

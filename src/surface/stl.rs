@@ -43,6 +43,32 @@ pub enum Up {
     Z,
 }
 
+impl std::str::FromStr for Unit {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Unit, Error> {
+        match text {
+            "mm" => Ok(Unit::Mm),
+            "m" => Ok(Unit::Metre),
+            "inch" | "in" => Ok(Unit::Inch),
+            _ => Err(Error::UnitName { text: text.into() }),
+        }
+    }
+}
+
+impl std::str::FromStr for Up {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Up, Error> {
+        match text {
+            "x" | "X" => Ok(Up::X),
+            "y" | "Y" => Ok(Up::Y),
+            "z" | "Z" => Ok(Up::Z),
+            _ => Err(Error::UpName { text: text.into() }),
+        }
+    }
+}
+
 impl Up {
     fn rotation(self) -> DMat3 {
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
