@@ -1,6 +1,7 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod compensate;
 mod part;
 mod raster;
 
@@ -39,6 +40,7 @@ pub struct Common {
 #[derive(Subcommand)]
 enum Command {
     Raster(raster::Arguments),
+    Compensate(compensate::Arguments),
 }
 
 /// How a command that was not refused ended.
@@ -65,6 +67,7 @@ pub fn run() -> ExitCode {
     }
     let outcome: Result<Outcome, Refusal> = match arguments.command {
         Command::Raster(of) => raster::run(&of, &arguments.common),
+        Command::Compensate(of) => compensate::run(&of, &arguments.common),
     };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,
