@@ -1,6 +1,7 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod compensate;
 mod part;
 mod raster;
 
@@ -44,6 +45,7 @@ pub struct Common {
 enum Command {
     Mill(mill::Arguments),
     Raster(raster::Arguments),
+    Compensate(compensate::Arguments),
 }
 
 /// How a command that was not refused ended.
@@ -77,6 +79,7 @@ pub fn run() -> ExitCode {
         Command::Mill(arguments) => mill::run(arguments, common),
     let outcome: Result<Outcome, Refusal> = match arguments.command {
         Command::Raster(of) => raster::run(&of, &arguments.common),
+        Command::Compensate(of) => compensate::run(&of, &arguments.common),
     };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,

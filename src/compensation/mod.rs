@@ -26,10 +26,12 @@ mod passes;
 mod profile;
 mod slopes;
 mod stencil;
+mod stream;
 mod tiles;
 
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows};
 pub use profile::Profile;
+pub use stream::{Band, stream};
 pub use tiles::{closing, cutter_location, cutter_location_rows, erode, residual};
 
 /// Why a compensation was refused.
@@ -47,4 +49,18 @@ pub enum Error {
         "cutter {cutter} spans {samples:.0} samples of {step_mm} mm from its axis, {most} at most can be tabulated; hint: a step of {hint_mm:.4} mm or more"
     )]
     TooManySamples { cutter: String, samples: f64, most: f64, step_mm: f64, hint_mm: f64 },
+    #[error("every {every} rows: there is no such row; hint: 1 is every row")]
+    Every { every: usize },
+    #[error(
+        "every {every} rows of {step_mm} mm leave strips that cutter {cutter} with a radius of {radius_mm} mm does not touch; hint: --every {most} at most"
+    )]
+    Strips { every: usize, step_mm: f64, cutter: String, radius_mm: f64, most: usize },
+    #[error("the height at column {column}, row {row} is {z_mm}; hint: NaN stands for no data")]
+    Infinite { column: i64, row: i64, z_mm: f32 },
+    #[error("none of the {samples} samples has data")]
+    NoData { samples: usize },
+    #[error(
+        "positions on samples fall below the true drop on a {source_kind}, by up to some um at its steps and ridges; hint: --sampled says that this is meant"
+    )]
+    NotExact { source_kind: &'static str },
 }

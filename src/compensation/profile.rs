@@ -73,6 +73,24 @@ impl Profile {
         ((self.radius_mm() + REACH_MM) / self.step_mm).floor() as usize
     }
 
+    /// Refuses rows so far apart that the cutter leaves strips between them untouched.
+    ///
+    /// # Errors
+    /// `every` rows are more than the cutter is wide.
+    pub fn covers_between(&self, every: usize) -> Result<(), Error> {
+        let most = 2 * self.reach();
+        if every <= most {
+            return Ok(());
+        }
+        Err(Error::Strips {
+            every,
+            step_mm: self.step_mm,
+            cutter: self.shape.to_string(),
+            radius_mm: self.radius_mm(),
+            most,
+        })
+    }
+
     /// s(d): how far the cutter's surface stands below its lowest point's level (so never
     /// positive) at `distance_mm` from its axis; None past the radius.
     pub fn s_mm(&self, distance_mm: f64) -> Option<f64> {
