@@ -1,6 +1,11 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod fixtures;
+mod machines;
+mod posts;
+mod tools;
+
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -34,7 +39,12 @@ pub struct Common {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Fixtures(fixtures::Arguments),
+    Machines(machines::Arguments),
+    Posts(posts::Arguments),
+    Tools(tools::Arguments),
+}
 
 /// How a command that was not refused ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +68,13 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     }
-    let outcome: Result<Outcome, Refusal> = match arguments.command {};
-    #[allow(unreachable_code)]
+    let common = &arguments.common;
+    let outcome: Result<Outcome, Refusal> = match &arguments.command {
+        Command::Fixtures(arguments) => fixtures::run(arguments, common),
+        Command::Machines(arguments) => machines::run(arguments, common),
+        Command::Posts(arguments) => posts::run(arguments, common),
+        Command::Tools(arguments) => tools::run(arguments, common),
+    };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,
         Ok(Outcome::Found) => ExitCode::from(1),
