@@ -4,6 +4,10 @@
 mod compensate;
 mod part;
 mod raster;
+mod fixtures;
+mod machines;
+mod posts;
+mod tools;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -46,6 +50,10 @@ enum Command {
     Mill(mill::Arguments),
     Raster(raster::Arguments),
     Compensate(compensate::Arguments),
+    Fixtures(fixtures::Arguments),
+    Machines(machines::Arguments),
+    Posts(posts::Arguments),
+    Tools(tools::Arguments),
 }
 
 /// How a command that was not refused ended.
@@ -80,6 +88,12 @@ pub fn run() -> ExitCode {
     let outcome: Result<Outcome, Refusal> = match arguments.command {
         Command::Raster(of) => raster::run(&of, &arguments.common),
         Command::Compensate(of) => compensate::run(&of, &arguments.common),
+    let common = &arguments.common;
+    let outcome: Result<Outcome, Refusal> = match &arguments.command {
+        Command::Fixtures(arguments) => fixtures::run(arguments, common),
+        Command::Machines(arguments) => machines::run(arguments, common),
+        Command::Posts(arguments) => posts::run(arguments, common),
+        Command::Tools(arguments) => tools::run(arguments, common),
     };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,

@@ -25,10 +25,14 @@ pub enum Error {
         "tool \"{tool}\" sticks out {stick_out_mm} mm and has to go {depth_mm:.3} mm below the stock's top; hint: a longer stick_out_mm, smaller tiles or level = \"plane\""
     )]
     Reach { tool: String, stick_out_mm: f64, depth_mm: f64 },
-    #[error("spindle_rpm is {rpm}, {machine} turns {low} .. {high} rpm; hint: a speed in that range")]
-    Rpm { rpm: f64, machine: String, low: f64, high: f64 },
-    #[error("{what} is {feed_mm_min}, {machine} feeds at {low} .. {high} mm/min; hint: a feed in that range")]
-    Feed { what: &'static str, feed_mm_min: f64, machine: String, low: f64, high: f64 },
+    #[error(
+        "tool \"{tool}\" runs at {rpm} rpm, {machine} turns {low} .. {high} rpm; hint: spindle_rpm in that range, or a library made for this machine"
+    )]
+    Rpm { tool: String, rpm: f64, machine: String, low: f64, high: f64 },
+    #[error(
+        "tool \"{tool}\": {key} is {feed_mm_min}, {machine} feeds at {low} .. {high} mm/min; hint: a feed in that range, or a library made for this machine"
+    )]
+    Feed { tool: String, key: &'static str, feed_mm_min: f64, machine: String, low: f64, high: f64 },
     #[error(
         "one {what} of {length_mm} mm does not fit {axis} of {machine}: {room_mm:.3} mm are left of {travel_mm} mm with a border of {border_mm}, a margin of {margin_mm} and an overrun of {overrun_mm:.3} mm on each side; hint: a smaller margin_mm, another fixture or a larger machine"
     )]

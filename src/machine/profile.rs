@@ -2,7 +2,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Error, SpindleSetting};
+use super::{Error, SpindleSetting, Tool};
 use crate::catalogue::{self, Kind};
 use crate::settings::{self, Source};
 
@@ -203,30 +203,28 @@ impl Machine {
         self.dialects.iter().any(|known| known == dialect)
     }
 
-    /// What a program has to say to turn the spindle, and the speed that comes out.
-    pub fn spindle_setting(&self, rpm: f64) -> Result<SpindleSetting, Error> {
-        self.spindle.setting(rpm).ok_or(Error::Rpm {
-            rpm,
+    /// What a program has to say to turn the spindle for a tool, and the speed that comes out.
+    ///
+    /// Errors: a speed or a feed that the machine cannot make. A cut may run in any direction, so
+    /// it is held to the limit of X and Y, a plunge to that of Z.
+    pub fn run(&self, tool: &Tool) -> Result<SpindleSetting, Error> {
+        let least = self.rate.feed_min_mm_min;
+        let limits = [
+            ("feed_mm_min", tool.feed_mm_min, self.rate.feed_xy_max_mm_min),
+            ("plunge_mm_min", tool.plunge_mm_min, self.rate.feed_z_max_mm_min),
+        ];
+        for (key, feed_mm_min, high) in limits {
+            if !(feed_mm_min >= least && feed_mm_min <= high) {
+                let (tool, machine) = (tool.name.clone(), self.name.clone());
+                return Err(Error::Feed { tool, key, feed_mm_min, machine, low: least, high });
+            }
+        }
+        self.spindle.setting(tool.spindle_rpm).ok_or_else(|| Error::Rpm {
+            tool: tool.name.clone(),
+            rpm: tool.spindle_rpm,
             machine: self.name.clone(),
             low: self.spindle.rpm_min,
             high: self.spindle.rpm_max,
         })
-    }
-
-    /// Refuses feeds that the machine cannot make: a cut may run in any direction, so it is held
-    /// to the X and Y limit, a plunge to that of Z.
-    pub fn check_feeds(&self, cut_mm_min: f64, plunge_mm_min: f64) -> Result<(), Error> {
-        let low = self.rate.feed_min_mm_min;
-        let limits = [
-            ("feed_mm_min", cut_mm_min, self.rate.feed_xy_max_mm_min),
-            ("plunge_mm_min", plunge_mm_min, self.rate.feed_z_max_mm_min),
-        ];
-        for (what, feed_mm_min, high) in limits {
-            if !(feed_mm_min >= low && feed_mm_min <= high) {
-                let machine = self.name.clone();
-                return Err(Error::Feed { what, feed_mm_min, machine, low, high });
-            }
-        }
-        Ok(())
     }
 }

@@ -71,8 +71,7 @@ struct Plan<'a> {
 impl<'a> Plan<'a> {
     fn new(program: &'a Program, dialect: &'a Dialect, machine: &Machine) -> Result<Plan<'a>, Error> {
         let tool = program.tool;
-        machine.check_feeds(tool.feed_mm_min, tool.plunge_mm_min)?;
-        let spindle = machine.spindle_setting(tool.spindle_rpm)?;
+        let spindle = machine.run(tool)?;
         let unit_mm = dialect.unit_mm;
         if program.path.unit_mm != unit_mm {
             return Err(Error::Grid {
