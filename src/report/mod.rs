@@ -3,6 +3,9 @@
 pub mod cavity_list;
 pub mod files;
 pub mod maps;
+mod palette;
+pub mod picture;
+mod scale;
 pub mod schema;
 
 pub use files::{write_json, write_whole};
