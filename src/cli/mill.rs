@@ -18,7 +18,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-pub fn run(arguments: Arguments, common: &Common) -> Result<Outcome, Refusal> {
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let job = Job::read(&arguments.job)?;
     let folder = arguments.job.parent().unwrap_or(Path::new("")).to_path_buf();
     let staging = Staging::beside(&arguments.out)?;

@@ -2,21 +2,20 @@
 //! the clock or asks for files by name.
 
 mod compensate;
-mod part;
-mod raster;
+mod console;
 mod fixtures;
 mod machines;
+mod mill;
+mod part;
 mod posts;
+mod raster;
+mod staging;
 mod tools;
 
 use std::error::Error;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-
-mod console;
-mod mill;
-mod staging;
 
 /// Directional projection screens and other reliefs, from design to proved programs.
 #[derive(Parser)]
@@ -50,9 +49,9 @@ enum Command {
     Mill(mill::Arguments),
     Raster(raster::Arguments),
     Compensate(compensate::Arguments),
-    Fixtures(fixtures::Arguments),
     Machines(machines::Arguments),
     Posts(posts::Arguments),
+    Fixtures(fixtures::Arguments),
     Tools(tools::Arguments),
 }
 
@@ -83,16 +82,13 @@ pub fn run() -> ExitCode {
         return ExitCode::from(2);
     }
     let common = &arguments.common;
-    let outcome: Result<Outcome, Refusal> = match arguments.command {
-        Command::Mill(arguments) => mill::run(arguments, common),
-    let outcome: Result<Outcome, Refusal> = match arguments.command {
-        Command::Raster(of) => raster::run(&of, &arguments.common),
-        Command::Compensate(of) => compensate::run(&of, &arguments.common),
-    let common = &arguments.common;
     let outcome: Result<Outcome, Refusal> = match &arguments.command {
-        Command::Fixtures(arguments) => fixtures::run(arguments, common),
+        Command::Mill(arguments) => mill::run(arguments, common),
+        Command::Raster(arguments) => raster::run(arguments, common),
+        Command::Compensate(arguments) => compensate::run(arguments, common),
         Command::Machines(arguments) => machines::run(arguments, common),
         Command::Posts(arguments) => posts::run(arguments, common),
+        Command::Fixtures(arguments) => fixtures::run(arguments, common),
         Command::Tools(arguments) => tools::run(arguments, common),
     };
     match outcome {

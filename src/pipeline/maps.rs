@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use super::Error;
 use super::judge::Strip;
 use crate::grid::{Heights, Lattice, Window};
-use crate::report::{self, Caption, MapFiles, MapRow, Picture, Preview, Reducer};
+use crate::report::maps::{self, MapRow, Reducer};
+use crate::report::picture::{self, Caption, Kind, Preview};
+use crate::report::MapFiles;
 use crate::surface::HeightWriter;
 
 /// The maps of a tile while they are written: z in the part's frame.
@@ -33,10 +35,10 @@ impl Maps {
         let (columns, rows) = (lattice.columns, lattice.rows);
         let reducer = match full {
             true => Reducer::by_factor(columns, rows, 1),
-            false => Reducer::within(columns, rows, report::FULL_SAMPLES),
+            false => Reducer::within(columns, rows, maps::FULL_SAMPLES),
         };
         let pitch_mm = lattice.step_mm * reducer.factor() as f64;
-        let writers = Picture::ALL
+        let writers = Kind::ALL
             .iter()
             .map(|kind| {
                 let path = folder.join(format!("{tile}-{}.tif", kind.name()));
@@ -49,7 +51,7 @@ impl Maps {
 
     /// Takes the next full rows of the tile.
     pub fn push(&mut self, strip: &Strip) -> Result<(), Error> {
-        let strip = report::Strip {
+        let strip = maps::Strip {
             design: &strip.design.z_mm,
             machined: &strip.machined.z_mm,
             cavity: &strip.cavity.z_mm,
@@ -78,7 +80,7 @@ impl Maps {
             writer.finish()?;
         }
         let factor = self.reducer.factor();
-        for kind in Picture::ALL {
+        for kind in Kind::ALL {
             let caption = Caption {
                 part: part.into(),
                 tile: self.tile.clone(),
@@ -86,10 +88,10 @@ impl Maps {
                 notes: notes.to_vec(),
             };
             let path = self.folder.join(format!("{}-{}.png", self.tile, kind.name()));
-            report::write_png(&path, &self.preview.draw(kind, &caption))?;
+            picture::write_png(&path, &self.preview.draw(kind, &caption))?;
         }
-        let name = |kind: Picture| format!("maps/{}-{}.tif", self.tile, kind.name());
-        let [design, machined, deviation, cavity] = Picture::ALL.map(name);
+        let name = |kind: Kind| format!("maps/{}-{}.tif", self.tile, kind.name());
+        let [design, machined, deviation, cavity] = Kind::ALL.map(name);
         Ok((MapFiles { design, machined, deviation, cavity }, factor))
     }
 }

@@ -236,7 +236,7 @@ fn read_back(
     let reading = Reading::from(&mut BufReader::with_capacity(1 << 20, open), &options)
         .map_err(|source| Error::ReadBack { path: file.clone(), source })?;
     let extent = reading.extent();
-    let timing = verify::time(&reading, &verify::Kinematics::of(&shop.machine));
+    let timing = verify::time(&reading, &(&shop.machine).into());
     Ok(Program { file, operation, reading, extent, timing, restarts })
 }
 

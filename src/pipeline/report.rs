@@ -10,7 +10,8 @@ use super::{Error, light};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
 use crate::job::{Form, Job};
-use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, TileCavities, finding};
+use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
+use crate::report::cavity_list::{self, TileCavities};
 use crate::tolerance::Budget;
 use crate::verify::ProgramCut;
 
@@ -68,10 +69,10 @@ pub fn finish(
         candidates: &result.candidates,
     });
     let cavities: Vec<TileCavities> = candidates.collect();
-    report::write_csv(&staging.join("cavities.csv"), &cavities)?;
-    report::write_geojson(&staging.join("cavities.geojson"), &cavities)?;
+    cavity_list::write_csv(&staging.join("cavities.csv"), &cavities)?;
+    cavity_list::write_geojson(&staging.join("cavities.geojson"), &cavities)?;
     report::write_json(&staging.join("report.json"), &report)?;
-    let simulate = results.iter().map(|result| simulate(job, shop, result)).collect();
+    let simulate = results.iter().map(|result| simulate(shop, result)).collect();
     Ok(Milled { report, simulate })
 }
 
@@ -126,7 +127,6 @@ fn of_tile(
 ) -> Result<Vec<Finding>, Error> {
     let name = result.tile.setup.tile.name.clone();
     let gouge_limit_mm = job.limits.gouge_or_default_mm();
-    let step_mm = job.part.step_mm;
     let mut found = Vec::new();
     if let Some(undercuts) = result.tile.piece.undercuts {
         let message = format!(
@@ -169,7 +169,6 @@ fn of_tile(
         }
         found.extend(bad);
     }
-    let _ = step_mm;
     Ok(found)
 }
 
@@ -191,10 +190,9 @@ fn of_motions(job: &Job, shop: &Shop, result: &TileResult, post: usize, index: u
         found.push(finding(Severity::Error, "travel", format!("{file}: {refusal}")).on(name));
     }
     if let Some(bite) = cut.rapid {
-        let message = format!("{file}: a rapid goes {:.4} mm deep through the stock", bite.depth_mm);
-        let place = [(bite.column as f64 + 0.5) * job.part.step_mm, (bite.row as f64 + 0.5) * job.part.step_mm];
-        let found_at = finding(Severity::Error, "rapid-through-stock", message);
-        found.push(found_at.on(name).at(&result.in_part(place)));
+        let message = format!("{file}:{}: a rapid goes {:.4} mm deep through the stock", bite.line, bite.depth_mm);
+        let place = result.in_part([bite.at_mm[0], bite.at_mm[1]]);
+        found.push(finding(Severity::Error, "rapid-through-stock", message).on(name).at(&place));
     }
     if let Some(rapid) = &result.lateral_rapids[post][index] {
         let message = format!(
@@ -355,7 +353,7 @@ fn of_limits(job: &Job, report: &Report, figures: &Figures) -> Vec<Finding> {
 }
 
 /// The command that judges a tile's programs again from the files alone.
-fn simulate(job: &Job, shop: &Shop, result: &TileResult) -> String {
+fn simulate(shop: &Shop, result: &TileResult) -> String {
     let post = &result.posts[0];
     let files: Vec<String> = post.programs.iter().map(|p| format!("{{out}}/{}", p.file.display())).collect();
     let cutters: Vec<String> =
@@ -371,7 +369,6 @@ fn simulate(job: &Job, shop: &Shop, result: &TileResult) -> String {
         top_mm + tile.allowance_mm,
         shop.machine.name
     );
-    let _ = job;
     if result.map_factor == 1 {
         command
     } else {

@@ -43,8 +43,7 @@ impl Shop {
         let mut tools = Vec::new();
         for operation in &job.operations {
             let tool = tool(operation, &library)?;
-            machine.check_feeds(tool.feed_mm_min, tool.plunge_mm_min)?;
-            machine.spindle_setting(tool.spindle_rpm)?;
+            machine.run(&tool)?;
             tools.push(tool);
         }
         let stock = Stock {

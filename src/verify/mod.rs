@@ -5,6 +5,7 @@ mod contact;
 mod error;
 mod gcode;
 mod judged;
+mod kinematics;
 mod reading;
 mod rml;
 mod sweep;
