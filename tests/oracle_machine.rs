@@ -103,21 +103,22 @@ proptest! {
             };
             prop_assert!(setup.check(&motions, 0.5, 5.0, &machine).is_ok());
             if !one {
-                for axis in 0..2 {
-                    prop_assert!(setup.zero_on_table_mm[axis] + setup.blank.low_mm[axis] >= 5.0 - 1e-9);
-                    prop_assert!(setup.zero_on_table_mm[axis] + setup.blank.high_mm[axis] <= travel[axis] - 5.0 + 1e-9);
+                for (axis, travel) in travel.into_iter().enumerate() {
+                    let zero = setup.zero_on_table_mm[axis];
+                    prop_assert!(zero + setup.blank.low_mm[axis] >= 5.0 - 1e-9);
+                    prop_assert!(zero + setup.blank.high_mm[axis] <= travel - 5.0 + 1e-9);
                 }
             }
         }
         prop_assert!((area - size[0] * size[1]).abs() < 1e-6);
         prop_assert!(longest[0] - shortest[0] <= cell && longest[1] - shortest[1] <= cell);
         // No fewer would do: one column less makes some tile too long.
-        for axis in 0..2 {
+        for (axis, travel) in travel.into_iter().enumerate() {
             let count = tiles.iter().map(|t| [t.column, t.row][axis]).max().unwrap_or(0) + 1;
             if count > 1 {
                 let cells = [columns, rows][axis];
-                let room = if one { travel[axis] - 10.0 - 2.0 * overrun } else {
-                    (travel[axis] - 2.0 * overrun).min(travel[axis] - 10.0 - 2.0 * margin)
+                let room = if one { travel - 10.0 - 2.0 * overrun } else {
+                    (travel - 2.0 * overrun).min(travel - 10.0 - 2.0 * margin)
                 };
                 prop_assert!(cells.div_ceil(count - 1) as f64 * cell > room - 1e-6);
             }
