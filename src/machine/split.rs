@@ -82,6 +82,7 @@ pub fn split(
 /// Pieces do not get shorter than `smallest_mm`.
 ///
 /// Errors: those of `need`, and that of [`fits_z`] for the first tile of the undivided part.
+#[expect(clippy::too_many_arguments, reason = "those of split, and what asks for Z")]
 pub fn split_in_z<E: From<Error>>(
     size_mm: [f64; 2],
     quantum: Quantum,

@@ -29,7 +29,7 @@ pub enum Error {
     #[error("the toolpath has no moves; hint: there is nothing to cut, leave the operation out")]
     Empty,
     #[error(
-        "the toolpath begins at z = {z_mm} mm, below the clearance plane at {clearance_mm} mm; hint: its first move is a rapid on that plane"
+        "the toolpath begins at z = {z_mm:.4} mm, below the clearance plane at {clearance_mm} mm; hint: its first move is a rapid on that plane"
     )]
     Start { z_mm: f64, clearance_mm: f64 },
     #[error(
@@ -37,10 +37,12 @@ pub enum Error {
     )]
     Clearance { clearance_mm: f64, stock_top_mm: f64 },
     #[error(
-        "move {index} is a rapid in X or Y at z = {z_mm} mm, below the stock's top at {stock_top_mm} mm; hint: such a move has to be a cut"
+        "move {index} is a rapid in X or Y at z = {z_mm:.4} mm, below the stock's top at {stock_top_mm} mm; hint: such a move has to be a cut"
     )]
     RapidInStock { index: usize, z_mm: f64, stock_top_mm: f64 },
-    #[error("{axis}{value_mm} mm is out of the range of {dialect}, +-{limit_mm} mm; hint: smaller tiles")]
+    #[error(
+        "{axis} {value_mm:.4} mm is out of the range of {dialect}, +-{limit_mm:.0} mm; hint: smaller tiles"
+    )]
     Value { axis: &'static str, value_mm: f64, dialect: String, limit_mm: f64 },
     #[error(
         "a feed of {feed_mm_min} mm/min cannot be named by {dialect}, whose smallest is {least_mm_min} mm/min; hint: a feed of at least that"

@@ -65,17 +65,16 @@ fn facts(
         facts.push(("wcs", program.wcs.into()));
     }
     facts.push(("units", "mm, mm/min".into()));
-    for (axis, name) in ["X", "Y", "Z"].into_iter().enumerate() {
-        let (low, high) = (short(bounds.low_mm[axis]), short(bounds.high_mm[axis]));
-        facts.push(("bounds", format!("{name} {low} to {high}")));
-    }
+    let range = |axis: usize| format!("{} to {}", short(bounds.low_mm[axis]), short(bounds.high_mm[axis]));
+    facts.push(("bounds", format!("X {}, Y {}, Z {}", range(0), range(1), range(2))));
     let feeds = format!(
         "{} mm/min, plunge {} mm/min, {} rpm",
         tool.feed_mm_min, tool.plunge_mm_min, tool.spindle_rpm
     );
     facts.push(("feed", feeds));
-    for section in machine.unconfirmed() {
-        facts.push(("verify against your machine", section.into()));
+    let unconfirmed = machine.unconfirmed();
+    if !unconfirmed.is_empty() {
+        facts.push(("verify against your machine", unconfirmed.join(", ")));
     }
     for (label, text) in program.notes {
         facts.push((label, text.clone()));
@@ -112,15 +111,21 @@ fn wrap(lines: &mut Vec<String>, comment: &Comment, dialect: &Dialect, text: &st
         !(' '..='~').contains(&c) || comment.forbidden.contains(c) || dialect.limits.forbidden.contains(c)
     };
     let text: String = text.chars().map(|c| if bad(c) { '_' } else { c }).collect();
-    let room = dialect.limits.line_max - comment.open.len() - comment.close.len();
+    let room = dialect.limits.line_max - comment.open.len() - comment.close.len() - CONTINUED.len();
     let mut rest = text.trim_end();
+    let mut prefix = "";
     while !rest.is_empty() {
         let end = if rest.len() <= room {
             rest.len()
         } else {
             rest[..=room].rfind(' ').filter(|&at| at > 0).unwrap_or(room)
         };
-        lines.push(format!("{}{}{}", comment.open, rest[..end].trim_end(), comment.close));
+        lines.push(format!("{}{prefix}{}{}", comment.open, rest[..end].trim_end(), comment.close));
         rest = rest[end..].trim_start();
+        prefix = CONTINUED;
     }
 }
+
+/// Before the rest of a text that is broken, since LinuxCNC runs a comment that begins with MSG,
+/// LOG, PRINT or DEBUG.
+const CONTINUED: &str = "- ";
