@@ -1,6 +1,8 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod design;
+
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -34,7 +36,9 @@ pub struct Common {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Design(design::Arguments),
+}
 
 /// How a command that was not refused ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +62,9 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     }
-    let outcome: Result<Outcome, Refusal> = match arguments.command {};
-    #[allow(unreachable_code)]
+    let outcome: Result<Outcome, Refusal> = match arguments.command {
+        Command::Design(ref of) => design::run(of, &arguments.common),
+    };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,
         Ok(Outcome::Found) => ExitCode::from(1),
