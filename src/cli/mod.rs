@@ -11,6 +11,7 @@ mod posts;
 mod raster;
 mod staging;
 mod tools;
+mod design;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -53,6 +54,7 @@ enum Command {
     Posts(posts::Arguments),
     Fixtures(fixtures::Arguments),
     Tools(tools::Arguments),
+    Design(design::Arguments),
 }
 
 /// How a command that was not refused ended.
@@ -90,6 +92,8 @@ pub fn run() -> ExitCode {
         Command::Posts(arguments) => posts::run(arguments, common),
         Command::Fixtures(arguments) => fixtures::run(arguments, common),
         Command::Tools(arguments) => tools::run(arguments, common),
+    let outcome: Result<Outcome, Refusal> = match arguments.command {
+        Command::Design(ref of) => design::run(of, &arguments.common),
     };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,

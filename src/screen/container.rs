@@ -13,6 +13,16 @@ use super::{Cell, CellRange, Design, Elevation, Facet, Profile, Seam};
 /// Most bytes that one array may hold.
 const MOST_BYTES: u64 = 1 << 34;
 
+/// An empty file in the folder of `path`, to be renamed to it when whole. Its mode is that of any new
+/// file.
+pub(super) fn beside(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.prefix(".screenmill-").tempfile_in(folder)
+}
+
 /// Why a container or an elevation file was not read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ContainerError {
@@ -64,11 +74,7 @@ impl Design {
     pub fn write(&self, path: &Path) -> Result<(), ContainerError> {
         let name = path.display().to_string();
         let io = |source| ContainerError::Io { path: path.display().to_string(), source };
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut file = tempfile::Builder::new();
-        #[cfg(unix)]
-        file.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let file = file.prefix(".screenmill-").tempfile_in(folder).map_err(io)?;
+        let file = beside(path).map_err(io)?;
         let mut zip = ZipWriter::new(BufWriter::new(file));
         self.write_arrays(&mut zip).map_err(io)?;
         let buffer = zip.finish().map_err(|source| ContainerError::Archive { path: name, source })?;

@@ -163,7 +163,7 @@ impl Design {
     }
 
     /// The cells of the core, by row, then column.
-    pub fn core_cells(&self) -> impl Iterator<Item = &Cell> {
+    pub fn core_cells(&self) -> impl Iterator<Item = &Cell> + Clone {
         let core = self.core;
         self.cells.iter().filter(move |cell| core.contains(cell.column, cell.row))
     }

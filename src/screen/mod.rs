@@ -15,6 +15,7 @@ mod microgeometry;
 mod power;
 mod scene;
 mod sight;
+mod solid;
 
 pub use audience::{HalfSpace, Polyhedron, View};
 pub use container::ContainerError;
@@ -26,3 +27,4 @@ pub use facets::{Grazing, Wanted, facets};
 pub use make::design;
 pub use microgeometry::{NotConverged, Solution, Workspace, solve};
 pub use scene::{AreaRule, ElevationMethod, Microgeometry, Reflector, Scene};
+pub use solid::SolidError;

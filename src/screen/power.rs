@@ -18,6 +18,8 @@ pub(super) struct Diagram {
     /// The neighbours of the last diagram, which most often are this one's too.
     hints: Vec<u32>,
     hint_start: Vec<usize>,
+    /// For each plane the last one that it was a first clip of.
+    clipped: Vec<usize>,
     polygon: Vec<Vertex>,
     spare: Vec<Vertex>,
 }
@@ -43,6 +45,8 @@ impl Diagram {
         self.vertices.clear();
         self.start.clear();
         self.start.push(0);
+        self.clipped.clear();
+        self.clipped.resize(n, usize::MAX);
         let [left, bottom] = low;
         let [right, top] = high;
         for i in 0..n {
@@ -55,6 +59,7 @@ impl Diagram {
             ]);
             for at in self.hint_start[i]..self.hint_start[i + 1] {
                 let j = self.hints[at] as usize;
+                self.clipped[j] = i;
                 self.clip([gx[i] - gx[j], gy[i] - gy[j]], c[j] - c[i], j as u32);
             }
             let mut disc = Disc::around(&self.polygon);
@@ -65,7 +70,8 @@ impl Diagram {
                 if room >= 0.0 && room * room >= (dx * dx + dy * dy) * disc.radius2 {
                     continue;
                 }
-                if j != i && self.clip([dx, dy], c[j] - c[i], j as u32) {
+                // A second clip by one plane would put a corner into the middle of its edge.
+                if j != i && self.clipped[j] != i && self.clip([dx, dy], c[j] - c[i], j as u32) {
                     disc = Disc::around(&self.polygon);
                 }
                 if self.polygon.is_empty() {
