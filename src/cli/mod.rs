@@ -1,6 +1,11 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod console;
+mod estimate;
+mod program;
+mod simulate;
+
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -34,7 +39,10 @@ pub struct Common {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Estimate(estimate::Arguments),
+    Simulate(simulate::Arguments),
+}
 
 /// How a command that was not refused ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +66,10 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     }
-    let outcome: Result<Outcome, Refusal> = match arguments.command {};
-    #[allow(unreachable_code)]
+    let outcome: Result<Outcome, Refusal> = match arguments.command {
+        Command::Estimate(ref of) => estimate::run(of, &arguments.common),
+        Command::Simulate(ref of) => simulate::run(of, &arguments.common),
+    };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,
         Ok(Outcome::Found) => ExitCode::from(1),
