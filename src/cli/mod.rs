@@ -12,6 +12,10 @@ mod raster;
 mod staging;
 mod tools;
 mod design;
+mod console;
+mod estimate;
+mod program;
+mod simulate;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -55,6 +59,8 @@ enum Command {
     Fixtures(fixtures::Arguments),
     Tools(tools::Arguments),
     Design(design::Arguments),
+    Estimate(estimate::Arguments),
+    Simulate(simulate::Arguments),
 }
 
 /// How a command that was not refused ended.
@@ -94,6 +100,9 @@ pub fn run() -> ExitCode {
         Command::Tools(arguments) => tools::run(arguments, common),
     let outcome: Result<Outcome, Refusal> = match arguments.command {
         Command::Design(ref of) => design::run(of, &arguments.common),
+    let outcome: Result<Outcome, Refusal> = match arguments.command {
+        Command::Estimate(ref of) => estimate::run(of, &arguments.common),
+        Command::Simulate(ref of) => simulate::run(of, &arguments.common),
     };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,

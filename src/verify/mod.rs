@@ -14,7 +14,7 @@ mod time;
 
 pub use error::{Error, Place};
 pub use judged::{Blank, Judged, LateralRapid};
-pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary};
+pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary, Travel};
 pub use sweep::{Bite, ProgramCut, Swept, sweep};
 pub use text::{language, read};
 pub use time::{Clock, Corner, Kinematics, Timing, time};

@@ -219,31 +219,56 @@ impl Reading {
         extent
     }
 
-    /// The speed at which an RML-1 program travels. RML-1 has no rapid word for three axes: its
-    /// travel speed is that of the first motion that names X and Y, if a later lateral motion is
-    /// slower. None for G-code, which has rapids.
+    /// The speed at which an RML-1 program travels (see [`Travel`]); None for G-code, which has rapids.
     pub fn travel_mm_min(&self) -> Option<f32> {
         if self.summary.language != Language::Rml1 {
             return None;
         }
-        let mut travel: Option<f32> = None;
-        let mut last = [f64::NAN; 3];
+        let mut travel = Travel::default();
         for motion in &self.motions {
-            let known = |p: &[f64; 3]| p[0].is_finite() && p[1].is_finite();
-            let lateral = known(&last) && (motion.to_mm[0] != last[0] || motion.to_mm[1] != last[1]);
-            match travel {
-                None if known(&motion.to_mm) => {
-                    if motion.rapid() {
-                        return None;
-                    }
-                    travel = Some(motion.feed_mm_min);
-                }
-                Some(speed) if lateral && motion.feed_mm_min < speed => return travel,
-                _ => {}
+            travel.add(motion);
+            if travel.slower {
+                break;
             }
-            last = motion.to_mm;
         }
-        None
+        travel.mm_min()
+    }
+}
+
+/// Finds the travel speed of an RML-1 program, motion by motion. RML-1 has no rapid word for three
+/// axes: its travel speed is that of the first motion that names X and Y, if a later lateral motion
+/// is slower.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Travel {
+    last: [f64; 3],
+    first: Option<f32>,
+    slower: bool,
+}
+
+impl Default for Travel {
+    fn default() -> Travel {
+        Travel { last: [f64::NAN; 3], first: None, slower: false }
+    }
+}
+
+impl Travel {
+    /// Takes the next motion in.
+    pub fn add(&mut self, motion: &Motion) {
+        let (to, last) = (motion.to_mm, self.last);
+        let known = |p: &[f64; 3]| p[0].is_finite() && p[1].is_finite();
+        match self.first {
+            None if known(&to) => self.first = Some(motion.feed_mm_min),
+            Some(first) if known(&last) && (to[0] != last[0] || to[1] != last[1]) => {
+                self.slower |= motion.feed_mm_min < first;
+            }
+            _ => {}
+        }
+        self.last = to;
+    }
+
+    /// The travel speed; None without one, and where the text has true rapids (PU, M).
+    pub fn mm_min(&self) -> Option<f32> {
+        self.first.filter(|first| self.slower && first.is_finite())
     }
 }
 
