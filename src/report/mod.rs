@@ -2,11 +2,15 @@
 
 pub mod cavity_list;
 pub mod files;
+mod format;
 pub mod maps;
+pub mod pages;
 mod palette;
 pub mod picture;
 mod scale;
 pub mod schema;
+pub mod setup_sheet;
+mod template;
 
 pub use files::{write_json, write_whole};
 pub use schema::{
@@ -24,4 +28,8 @@ pub enum Error {
          hint: every layer must be of the same tile"
     )]
     Strip { samples: usize, columns: usize, rows_left: usize },
+    #[error(
+        "{page} could not be filled in: {source}; hint: this is a fault of the program, please report it"
+    )]
+    Page { page: &'static str, source: Box<minijinja::Error> },
 }

@@ -16,7 +16,7 @@ use super::{Error, write_whole};
 
 /// Longest side of a map in a picture, in pixels.
 const MOST_PIXELS: usize = 1200;
-const HEADER: i32 = 92;
+const HEADER: i32 = 124;
 const LEFT: i32 = 92;
 const RIGHT: i32 = 190;
 const LINE_HEIGHT: i32 = 25;
@@ -303,8 +303,12 @@ impl Sheet {
             Kind::Deviation => "deviation of the largest size",
             Kind::Cavity => "greatest depth",
         };
-        let shaded = if shaded { "; relief shaded from the upper left, stretched" } else { "" };
-        format!("a pixel shows the {what} in {pitch_mm:.3} mm x {pitch_mm:.3} mm{shaded}; grey is no data")
+        let colors = if shaded {
+            "relief shaded from the upper left, stretched"
+        } else {
+            "colours go by the square root, so that small figures show"
+        };
+        format!("a pixel shows the {what} in {pitch_mm:.3} mm x {pitch_mm:.3} mm; {colors}; grey is no data")
     }
 
     fn map(&mut self, raster: &Raster, scale: &Scale, palette: &Palette, relief: Option<&Relief>) {
@@ -332,7 +336,7 @@ impl Sheet {
         let (width_mm, height_mm) =
             (f64::from(self.width) / self.pixels_per_mm, f64::from(self.height) / self.pixels_per_mm);
         let bottom = self.top + self.height;
-        let count = |pixels: i32| (pixels / 130).clamp(1, 8) as usize;
+        let count = |pixels: i32| (pixels / 110).clamp(2, 8) as usize;
         for (x_mm, label) in ticks(origin_mm[0], origin_mm[0] + width_mm, count(self.width)) {
             let x = self.left + ((x_mm - origin_mm[0]) * self.pixels_per_mm).round() as i32;
             self.line(x, bottom + 1, x, bottom + 7);
@@ -380,7 +384,7 @@ impl Sheet {
         let [low, high] = kind.ends();
         self.text(SOFT_INK, left, self.top + 19, 17.0, high);
         self.text(SOFT_INK, left, top + height + 5, 17.0, low);
-        for (value_mm, label) in scale.ticks((height / 75) as usize) {
+        for (value_mm, label) in scale.ticks((height / 75).max(2) as usize) {
             let y = top + height - (scale.place(value_mm) * f64::from(height)).round() as i32;
             self.line(left + width, y, left + width + 6, y);
             self.text(INK, left + width + 11, y - 10, 18.0, &label);
@@ -390,10 +394,10 @@ impl Sheet {
             (low.min(f64::from(value)), high.max(f64::from(value)))
         });
         if lowest <= highest {
-            let range = format!("{:.1} to {:.1} {unit}", lowest * per_mm, highest * per_mm);
-            let digits = if unit == "mm" { format!("{lowest:.3} to {highest:.3} mm") } else { range };
+            let decimals = if unit == "mm" { 3 } else { 1 };
+            let range = format!("{:.decimals$} to {:.decimals$} {unit}", lowest * per_mm, highest * per_mm);
             let y = top + height + if low.is_empty() { 8 } else { 30 };
-            self.text(SOFT_INK, left, y, 16.0, &digits.replace('-', "\u{2212}"));
+            self.text(SOFT_INK, left, y, 16.0, &range.replace('-', "\u{2212}"));
         }
     }
 

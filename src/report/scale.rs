@@ -11,11 +11,13 @@ pub fn round_up(value: f64) -> f64 {
     factor.unwrap_or(10.0) * power
 }
 
-/// A range in mm with the unit it is written in.
+/// A range in mm, spread evenly or by the square root of the distance from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     pub low_mm: f64,
     pub high_mm: f64,
+    /// Shows micrometres beside tenths of a millimetre: colours go by the square root.
+    pub by_root: bool,
 }
 
 impl Scale {
@@ -25,25 +27,26 @@ impl Scale {
         let low_mm = quantile(&sorted, 0.002);
         let high_mm = quantile(&sorted, 0.998);
         let lack_mm = 0.5 * (1e-4 - (high_mm - low_mm)).max(0.0);
-        Scale { low_mm: low_mm - lack_mm, high_mm: high_mm + lack_mm }
+        Scale { low_mm: low_mm - lack_mm, high_mm: high_mm + lack_mm, by_root: false }
     }
 
     /// From 0 to a round figure that 99.5 % of the values above `floor_mm` stay below.
     pub fn from_zero(values: &[f32], floor_mm: f32) -> Scale {
         let sorted = sorted(values.iter().copied().filter(|&value| value > floor_mm));
-        Scale { low_mm: 0.0, high_mm: round_up(quantile(&sorted, 0.995).max(1e-4)) }
+        Scale { low_mm: 0.0, high_mm: round_up(quantile(&sorted, 0.995).max(1e-4)), by_root: true }
     }
 
     /// As far below 0 as above, to a round figure that 99.5 % of |values| stay below.
     pub fn about_zero(values: &[f32]) -> Scale {
         let sorted = sorted(values.iter().map(|value| value.abs()));
         let high_mm = round_up(quantile(&sorted, 0.995).max(1e-4));
-        Scale { low_mm: -high_mm, high_mm }
+        Scale { low_mm: -high_mm, high_mm, by_root: true }
     }
 
     /// Where a value stands between the ends, 0 to 1 within them.
     pub fn place(&self, value_mm: f64) -> f64 {
-        (value_mm - self.low_mm) / (self.high_mm - self.low_mm)
+        let spread = |mm: f64| if self.by_root { mm.signum() * mm.abs().sqrt() } else { mm };
+        (spread(value_mm) - spread(self.low_mm)) / (spread(self.high_mm) - spread(self.low_mm))
     }
 
     /// Name of the unit and how many of it make a millimetre.
@@ -54,6 +57,14 @@ impl Scale {
     /// Round values within the range, in mm, at most about `count` of them, labelled in the range's unit.
     pub fn ticks(&self, count: usize) -> Vec<(f64, String)> {
         let (_, per_mm) = self.unit();
+        if self.by_root {
+            let up = [0.0, 0.05, 0.2, 0.5, 1.0];
+            let down = up.iter().rev().take(if self.low_mm < 0.0 { 4 } else { 0 }).map(|part| -part);
+            let values = down.chain(up).map(|part| part * self.high_mm);
+            // Six decimals hide the last bit of 0.2 * 0.05.
+            let label = |mm: f64| format!("{}", (mm * per_mm * 1e6).round() / 1e6).replace('-', "\u{2212}");
+            return values.map(|mm| (mm, label(mm))).collect();
+        }
         let ticks = ticks(self.low_mm * per_mm, self.high_mm * per_mm, count);
         ticks.into_iter().map(|(value, label)| (value / per_mm, label)).collect()
     }
@@ -96,9 +107,14 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        let scale = Scale { low_mm: -0.02, high_mm: 0.02 };
+        let scale = Scale { low_mm: -0.02, high_mm: 0.02, by_root: false };
         let labels: Vec<String> = scale.ticks(4).into_iter().map(|(_, label)| label).collect();
         assert_eq!(labels, ["\u{2212}20", "\u{2212}10", "0", "10", "20"]);
         assert_eq!(scale.unit().0, "µm");
+        let labels: Vec<String> =
+            Scale { by_root: true, ..scale }.ticks(4).into_iter().map(|(_, label)| label).collect();
+        assert_eq!(labels, ["\u{2212}20", "\u{2212}10", "\u{2212}4", "\u{2212}1", "0", "1", "4", "10", "20"]);
+        let places = [-0.02, -0.005, 0.0, 0.005, 0.02].map(|mm| Scale { by_root: true, ..scale }.place(mm));
+        assert_eq!(places, [0.0, 0.25, 0.5, 0.75, 1.0]);
     }
 }
