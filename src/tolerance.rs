@@ -44,7 +44,7 @@ pub enum Error {
     #[error("the controller's path tolerance is {path_tolerance_mm} mm, it must be 0 or more")]
     PathTolerance { path_tolerance_mm: f64 },
     #[error(
-        "gouge_mm = {gouge_mm} cannot be kept: the controller's path tolerance of {path_tolerance_mm} mm takes {controller_mm:.6} mm on this part's slopes and number formats {rounding_mm:.6} mm, {least_mm} mm must be left; hint: gouge_mm of at least {enough_mm:.4}, or a smaller path tolerance"
+        "gouge_mm = {gouge_mm} cannot be kept: the controller's path tolerance of {path_tolerance_mm} mm takes {controller_mm:.6} mm on this part's slopes and 32-bit heights {rounding_mm:.7} mm, {least_mm} mm must be left; hint: gouge_mm of at least {enough_mm:.4}, or a smaller path tolerance"
     )]
     Spent {
         gouge_mm: f64,

@@ -8,9 +8,9 @@
 //!   cutter (radius r) allows, the contact keeps Z = sqrt(r^2 - t^2) of the tip's centre above it, so
 //!   |f''| <= r^2 / Z^3 and f <= chord + r^2 dx^2 / (8 Z^3). A controller that leaves its path by P in any
 //!   direction costs at most P r / Z.
-//! * *steep* (walls, flat cutters): f peaks at the sample's own foot, at most dx/2 from a position. For
-//!   a cutter widened by dx/2 + P the larger of both ends bounds the whole interval. A flat cutter
-//!   needs sqrt((R + P)^2 + (dx/2)^2) only.
+//! * *steep* (walls, flat cutters): a cutter widened by dx/2 + P at each end bounds the half of the interval
+//!   next to it. A flat cutter needs only sqrt((R + P)^2 + (dx/2)^2): a sample that it meets anywhere in
+//!   the interval it then meets at one of the ends, so the larger of both bounds the whole.
 
 use std::ops::Range;
 
@@ -26,7 +26,7 @@ use crate::tolerance::Budget;
 const BULGE_MOST: f64 = 0.25;
 
 /// Distances from the axis, as parts of the radius, within which the highest sample is known.
-const RINGS: [f64; 3] = [1.0, 0.85, 0.7];
+const RINGS: [f64; 4] = [1.0, 0.93, 0.85, 0.75];
 
 /// Columns of the blocks in which steep places are evaluated together.
 const STEEP_BLOCK: usize = 256;
@@ -110,9 +110,10 @@ impl Cutter {
         let wide = self.steep_places(strip, layout, passes, &steep);
         envelopes.par_iter_mut().zip(steep).zip(wide).for_each(|((envelope, steep), wide)| {
             for (i, _) in steep.iter().enumerate().filter(|s| *s.1) {
-                let higher = f64::from(wide[i]).max(f64::from(wide[i + 1]));
-                envelope.bound_mm[i] = envelope.bound_mm[i].max(higher);
-                envelope.bound_mm[i + 1] = envelope.bound_mm[i + 1].max(higher);
+                let (left, right) = (f64::from(wide[i]), f64::from(wide[i + 1]));
+                let (left, right) = self.steep_ends(left, right);
+                envelope.bound_mm[i] = envelope.bound_mm[i].max(left);
+                envelope.bound_mm[i + 1] = envelope.bound_mm[i + 1].max(right);
             }
         });
         envelopes
@@ -146,6 +147,17 @@ impl Cutter {
             }
         }
         (Envelope { bound_mm, cl_mm }, steep)
+    }
+
+    /// Ends of a line over a steep interval. Each half of it must stand above its own end's location: on
+    /// a slope both ends are raised by half their difference, at a wall both stand at the higher one.
+    fn steep_ends(&self, left_mm: f64, right_mm: f64) -> (f64, f64) {
+        let apart_mm = (left_mm - right_mm).abs();
+        if apart_mm <= self.pitch_mm {
+            (left_mm + 0.5 * apart_mm, right_mm + 0.5 * apart_mm)
+        } else {
+            (left_mm.max(right_mm), left_mm.max(right_mm))
+        }
     }
 
     /// The wide cutter's locations at both ends of the steep intervals, block by block of columns.

@@ -58,6 +58,7 @@ pub fn stepover_mm(shape: &Shape, scallop_mm: f64, slope_across: f64) -> Result<
 
 /// Where the passes lie and where on them the cutter location is evaluated.
 pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
+    site.validate(0.0)?;
     let along = Axis::from_deg(params.direction_deg)?;
     if !(params.stock_to_leave_mm >= 0.0 && params.stock_to_leave_mm.is_finite()) {
         return Err(Error::StockToLeave { leave_mm: params.stock_to_leave_mm });

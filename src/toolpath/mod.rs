@@ -156,7 +156,7 @@ impl Site<'_> {
         let farthest_mm =
             across.max(up) + self.origin_mm[0].abs().max(self.origin_mm[1].abs()) + 2.0 * self.unit_mm;
         let limit_mm = f64::from(i32::MAX) * self.unit_mm;
-        if !(farthest_mm < limit_mm) {
+        if farthest_mm.is_nan() || farthest_mm >= limit_mm {
             return Err(Error::Grid { reach_mm: farthest_mm, unit_mm: self.unit_mm, limit_mm });
         }
         Ok(())

@@ -81,6 +81,7 @@ pub fn rough(site: &Site, params: &Params, progress: Progress) -> Result<Toolpat
 }
 
 fn layout(site: &Site, params: &Params) -> Result<(Layout, i32), Error> {
+    site.validate(0.0)?;
     let along = Axis::from_deg(params.direction_deg)?;
     let radius = params.shape.radius_mm();
     if !(params.stock_to_leave_mm >= 0.0 && params.stock_to_leave_mm.is_finite()) {
@@ -207,45 +208,74 @@ fn row_profiles(
     out
 }
 
+/// Cuts one level. A cut is followed by one of the next row that it can be linked to, so that each
+/// pocket and each side of the margin is cleared in one go where it can be.
 fn cut_level(site: &Site, params: &Params, plan: &Plan, above: i32, level: i32, pen: &mut Pen) {
     let point = |u, v, z| plan.layout.along.point(u, v, z);
-    // The row and the cut before.
-    let mut before: Option<(usize, Profile)> = None;
-    for (k, row) in plan.rows.iter().enumerate() {
-        let mut cuts: Vec<Profile> =
-            row.profiles.iter().flat_map(|profile| levels::cuts(profile, above, level)).collect();
-        if k % 2 == 1 {
-            cuts.reverse();
-            cuts.iter_mut().for_each(|cut| cut.reverse());
-        }
-        for cut in cuts {
-            let [u, z] = cut[0];
-            let link = match &before {
-                Some((from, last)) if from + 1 == k => crossing(site, params, plan, k, last, &cut, above)
-                    .map(|at| (plan.rows[*from].across, last, at)),
-                _ => None,
-            };
-            match link {
-                Some((from, last, at)) => {
-                    pen.cut(point(last[last.len() - 1][0], from, above));
-                    pen.cut(point(at, from, above));
-                    pen.cut(point(at, row.across, above));
-                    pen.cut(point(u, row.across, above));
-                    pen.cut(point(u, row.across, z));
+    let mut rows: Vec<Vec<Option<Profile>>> = plan
+        .rows
+        .iter()
+        .map(|row| row.profiles.iter().flat_map(|p| levels::cuts(p, above, level)).map(Some).collect())
+        .collect();
+    for first in 0..rows.len() {
+        for nth in 0..rows[first].len() {
+            let Some(mut cut) = rows[first][nth].take() else { continue };
+            let mut k = first;
+            pen.begin(point(cut[0][0], plan.rows[k].across, cut[0][1]), above);
+            loop {
+                for &[u, z] in &cut[1..] {
+                    pen.cut(point(u, plan.rows[k].across, z));
                 }
-                None => pen.begin(point(u, row.across, z), above),
+                let Some((at, next)) = follow(site, params, plan, k + 1, &cut, &mut rows, above) else {
+                    break;
+                };
+                let (from, to) = (plan.rows[k].across, plan.rows[k + 1].across);
+                pen.cut(point(cut[cut.len() - 1][0], from, above));
+                pen.cut(point(at, from, above));
+                pen.cut(point(at, to, above));
+                pen.cut(point(next[0][0], to, above));
+                pen.cut(point(next[0][0], to, next[0][1]));
+                (k, cut) = (k + 1, next);
             }
-            for &[u, z] in &cut[1..] {
-                pen.cut(point(u, row.across, z));
-            }
-            before = Some((k, cut));
         }
     }
 }
 
-/// Where to cross over from the end of one row's cut to the begin of the next row's, at the height of
+/// Takes the cut of row `k` that is the shortest way from the end of `last`, turned to begin there, and
+/// where to cross over to it.
+fn follow(
+    site: &Site,
+    params: &Params,
+    plan: &Plan,
+    k: usize,
+    last: &[[i32; 2]],
+    rows: &mut [Vec<Option<Profile>>],
+    above: i32,
+) -> Option<(i32, Profile)> {
+    let end = last[last.len() - 1][0];
+    let mut best: Option<(i64, usize, i32)> = None;
+    for (nth, cut) in rows.get(k)?.iter().enumerate() {
+        let Some(cut) = cut else { continue };
+        let (head, tail) = (cut[0][0], cut[cut.len() - 1][0]);
+        let near = if (end - head).abs() <= (end - tail).abs() { head } else { tail };
+        let Some(at) = crossing(site, params, plan, k, last, cut, near, above) else { continue };
+        let way = i64::from((end - at).abs()) + i64::from((near - at).abs());
+        if best.is_none_or(|(least, ..)| way < least) {
+            best = Some((way, nth, at));
+        }
+    }
+    let (_, nth, at) = best?;
+    let mut cut = rows[k][nth].take()?;
+    if (end - cut[0][0]).abs() > (end - cut[cut.len() - 1][0]).abs() {
+        cut.reverse();
+    }
+    Some((at, cut))
+}
+
+/// Where to cross over from the end of one row's cut to the end `to` of the next row's, at the height of
 /// the level above: both rows have been cut at that height a little to both sides, so what stands
 /// between them is at most a cusp, and the surface between them is lower.
+#[allow(clippy::too_many_arguments)]
 fn crossing(
     site: &Site,
     params: &Params,
@@ -253,6 +283,7 @@ fn crossing(
     k: usize,
     last: &[[i32; 2]],
     next: &[[i32; 2]],
+    to: i32,
     above: i32,
 ) -> Option<i32> {
     let ends = |cut: &[[i32; 2]]| {
@@ -268,7 +299,7 @@ fn crossing(
     if low > high {
         return None;
     }
-    let (from, to) = (last[last.len() - 1][0], next[0][0]);
+    let from = last[last.len() - 1][0];
     let free = |u: i32| {
         let place = (u - plan.layout.start) / plan.coarse;
         let bounds = &plan.rows[k].between;

@@ -71,7 +71,7 @@ impl Strip {
         let mut z_mm = vec![f32::NEG_INFINITY; window.columns];
         let mut row = low;
         while row < end {
-            let (from, rows) = if row % BLOCK == 0 && row + BLOCK <= end {
+            let (from, rows) = if row.is_multiple_of(BLOCK) && row + BLOCK <= end {
                 (&self.blocks[row / BLOCK * window.columns..], BLOCK)
             } else {
                 (&self.heights.z_mm[row * window.columns..], 1)
