@@ -24,7 +24,7 @@ const BLOCK: usize = 4 * CELL;
 const CHEAP: usize = 6;
 
 /// Groups of lanes from which a sample's box is worth tightening by far neighbours.
-pub(super) const WIDE: f64 = 40.0;
+pub(super) const WIDE: f64 = 100.0;
 
 widest! {
     /// Raises the targets by every sample of the field that can touch a cutter there.
