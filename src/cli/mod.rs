@@ -3,19 +3,18 @@
 
 mod compensate;
 mod console;
+mod design;
+mod estimate;
 mod fixtures;
 mod machines;
 mod mill;
 mod part;
 mod posts;
+mod program;
 mod raster;
+mod simulate;
 mod staging;
 mod tools;
-mod design;
-mod console;
-mod estimate;
-mod program;
-mod simulate;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -52,15 +51,15 @@ pub struct Common {
 #[derive(Subcommand)]
 enum Command {
     Mill(mill::Arguments),
+    Estimate(estimate::Arguments),
+    Design(design::Arguments),
     Raster(raster::Arguments),
     Compensate(compensate::Arguments),
+    Simulate(simulate::Arguments),
     Machines(machines::Arguments),
     Posts(posts::Arguments),
     Fixtures(fixtures::Arguments),
     Tools(tools::Arguments),
-    Design(design::Arguments),
-    Estimate(estimate::Arguments),
-    Simulate(simulate::Arguments),
 }
 
 /// How a command that was not refused ended.
@@ -92,17 +91,15 @@ pub fn run() -> ExitCode {
     let common = &arguments.common;
     let outcome: Result<Outcome, Refusal> = match &arguments.command {
         Command::Mill(arguments) => mill::run(arguments, common),
+        Command::Estimate(arguments) => estimate::run(arguments, common),
+        Command::Design(arguments) => design::run(arguments, common),
         Command::Raster(arguments) => raster::run(arguments, common),
         Command::Compensate(arguments) => compensate::run(arguments, common),
+        Command::Simulate(arguments) => simulate::run(arguments, common),
         Command::Machines(arguments) => machines::run(arguments, common),
         Command::Posts(arguments) => posts::run(arguments, common),
         Command::Fixtures(arguments) => fixtures::run(arguments, common),
         Command::Tools(arguments) => tools::run(arguments, common),
-    let outcome: Result<Outcome, Refusal> = match arguments.command {
-        Command::Design(ref of) => design::run(of, &arguments.common),
-    let outcome: Result<Outcome, Refusal> = match arguments.command {
-        Command::Estimate(ref of) => estimate::run(of, &arguments.common),
-        Command::Simulate(ref of) => simulate::run(of, &arguments.common),
     };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,

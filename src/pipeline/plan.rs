@@ -41,8 +41,6 @@ pub struct Program {
     pub reading: Reading,
     pub extent: Extent,
     pub timing: Timing,
-    /// Starts of passes that a stopped program may begin again at.
-    pub restarts: usize,
 }
 
 /// The programs of a tile in one dialect.
@@ -198,10 +196,9 @@ pub fn programs(
         progress.begin("write", 1);
         let file = program_file(job, shop, &tile.setup.tile.name, dialect, index, tool);
         write(job, shop, tile, dialect, index, &path, &folder.join(&file))?;
-        let restarts = path.pass_starts.len();
         drop(path);
         progress.begin("read back", 1);
-        planned.programs.push(read_back(shop, dialect, folder, file, index, restarts)?);
+        planned.programs.push(read_back(shop, dialect, folder, file, index)?);
     }
     Ok(planned)
 }
@@ -228,7 +225,6 @@ fn read_back(
     folder: &Path,
     file: PathBuf,
     operation: usize,
-    restarts: usize,
 ) -> Result<Program, Error> {
     let path = folder.join(&file);
     let open = File::open(&path).map_err(|source| Error::Output { path: path.clone(), source })?;
@@ -237,7 +233,7 @@ fn read_back(
         .map_err(|source| Error::ReadBack { path: file.clone(), source })?;
     let extent = reading.extent();
     let timing = verify::time(&reading, &(&shop.machine).into());
-    Ok(Program { file, operation, reading, extent, timing, restarts })
+    Ok(Program { file, operation, reading, extent, timing })
 }
 
 /// Writes one program; a file that could not be finished keeps no name.
