@@ -144,7 +144,7 @@ fn block(reading: &Reading, shape: Shape, window: Window) -> screenmill::verify:
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_cutter_equals_the_search(

@@ -14,7 +14,7 @@ use screenmill::verify::{
 };
 use serde_json::{Value, json};
 
-use super::console::Console;
+use super::console::{Console, listen_for_interrupt};
 use super::program::{bounds, clock, read};
 use super::{Common, Outcome, Refusal};
 
@@ -95,10 +95,13 @@ struct Program {
     reading: Reading,
     extent: Extent,
     timing: Option<Timing>,
+    /// Lowest and highest x and y of the feed motions in the part's frame.
+    worked_mm: Option<[[f64; 2]; 2]>,
     cut: ProgramCut,
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
+    listen_for_interrupt()?;
     let console = Console::new(common.quiet, common.verbose);
     let judgement = judge(arguments, &console)?;
     console.times();
@@ -155,6 +158,7 @@ fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal>
         .map_err(|source| Refused::Folder { path: arguments.out.clone(), source })?;
     let cut = cut(surface.as_ref(), &judged, &blank, &arguments.out, console)?;
     let lateral: Vec<_> = judged.iter().map(|j| j.lateral_rapid(&blank)).collect();
+    let worked: Vec<_> = judged.iter().map(Judged::worked_mm).collect();
     let mut findings = Vec::new();
     let mut told = Vec::new();
     for (index, reading) in readings.into_iter().enumerate() {
@@ -164,6 +168,7 @@ fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal>
             extent: reading.extent(),
             timing: machine.as_ref().map(|machine| time(&reading, &Kinematics::from(machine))),
             reading,
+            worked_mm: worked[index],
             cut: cut.programs[index],
         };
         program.findings(&blank, zero_mm, &mut findings);
@@ -277,15 +282,16 @@ impl Program {
             );
             findings.push(finding(Severity::Error, "rapid-through-stock", message).at(&hit.at_mm));
         }
-        let (low, high) = (self.extent.low_mm, self.extent.high_mm);
         let part = [0, 1].map(|axis| [blank.low_mm[axis], blank.high_mm[axis]]);
-        let place = [0, 1].map(|axis| [low[axis] + zero_mm[axis], high[axis] + zero_mm[axis]]);
+        // A program without a feed motion works nowhere.
+        let [low, high] = self.worked_mm.unwrap_or([[f64::NAN; 2]; 2]);
+        let place = [0, 1].map(|axis| [low[axis], high[axis]]);
         let reach = self.cutter.radius_mm();
         let beside = (0..2)
             .any(|axis| place[axis][1] + reach < part[axis][0] || place[axis][0] - reach > part[axis][1]);
         if beside {
             let message = format!(
-                "{file} runs x {:.3} .. {:.3}, y {:.3} .. {:.3} in the part's frame, the part is {:.3} x {:.3} mm; \
+                "{file} cuts x {:.3} .. {:.3}, y {:.3} .. {:.3} in the part's frame, the part is {:.3} x {:.3} mm; \
                  hint: another part, or another --zero",
                 place[0][0], place[0][1], place[1][0], place[1][1], part[0][1], part[1][1]
             );
@@ -294,7 +300,7 @@ impl Program {
             let message = format!(
                 "{file} cuts nothing: its lowest point is z {:.3} in the part's frame, the stock's top {:.3}; \
                  hint: another --zero or --stock-top-mm, or it ran before",
-                low[2] + zero_mm[2],
+                self.extent.low_mm[2] + zero_mm[2],
                 blank.top_mm
             );
             findings.push(finding(Severity::Warning, "cuts-nothing", message));

@@ -47,6 +47,25 @@ impl<'a> Judged<'a> {
         motion.rapid() || self.travel_mm_min.is_some_and(|speed| motion.feed_mm_min >= speed)
     }
 
+    /// Lowest and highest x and y of the feed motions in the part frame, without the cutter; None if
+    /// there are none.
+    pub fn worked_mm(&self) -> Option<[[f64; 2]; 2]> {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let mut last = [f64::NAN; 3];
+        for motion in &self.reading.motions {
+            if !self.rapid(motion) {
+                for axis in 0..2 {
+                    let (from, to) =
+                        (last[axis] + self.zero_mm[axis], motion.to_mm[axis] + self.zero_mm[axis]);
+                    low[axis] = low[axis].min(from).min(to);
+                    high[axis] = high[axis].max(from).max(to);
+                }
+            }
+            last = motion.to_mm;
+        }
+        (low[0] <= high[0] && low[1] <= high[1]).then_some([low, high])
+    }
+
     /// The rapid that moves in X or Y deepest below the blank's top while over or in the blank. A rapid
     /// to the machine's home counts with the place it leaves from.
     pub fn lateral_rapid(&self, blank: &Blank) -> Option<LateralRapid> {
