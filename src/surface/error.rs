@@ -31,7 +31,9 @@ pub enum Error {
         "{path}: {columns} x {rows} samples of {bytes} bytes each, at most {limit:.0e} samples can be held; hint: is the file damaged?"
     )]
     HugeClaim { path: String, columns: u64, rows: u64, bytes: u64, limit: f64 },
-    #[error("{path}: the file is empty (0 bytes)")]
+    #[error("{path}: {columns} x {rows} samples are no image; hint: is the file damaged?")]
+    NoSamples { path: String, columns: u64, rows: u64 },
+    #[error("{path}: the file is empty (0 bytes); hint: export or copy it again")]
     Empty { path: String },
     #[error(
         "{path}: cut off: {wanted} bytes of data announced, {found} there; hint: export or copy the file again"
@@ -57,7 +59,7 @@ pub enum Error {
         "{path}: none of the {triangles} triangles can be seen from above (up is {up}); hint: --up x, y or z"
     )]
     NoFaces { path: String, triangles: u64, up: char },
-    #[error("{path}: {reason}; hint: write 32-bit float heights in mm, one channel, without tiles or pages")]
+    #[error("{path}: {reason}; hint: write 32-bit float heights in mm, one channel, one page")]
     Tiff { path: String, reason: String },
     #[error(
         "{path}: {reason}; hint: numpy.save of a two-dimensional float32 or float64 array, heights in mm"

@@ -32,6 +32,17 @@ impl Triangles {
         }
     }
 
+    /// A length that single precision leaves whole steps, as whole steps: 6 mm written in inches
+    /// comes back a hair longer, which must not make a column of its own.
+    fn whole_steps(&self, length_mm: f64, step_mm: f64) -> f64 {
+        let Triangles::Single { corners, frame } = self else { return length_mm };
+        let largest = corners.iter().flatten().flatten().fold(0f32, |largest, c| largest.max(c.abs()));
+        let scale = frame.matrix3.x_axis.length();
+        let slack = f64::from(largest) * scale * f64::from(f32::EPSILON);
+        let whole = (length_mm / step_mm).round() * step_mm;
+        if (length_mm - whole).abs() <= slack { whole } else { length_mm }
+    }
+
     pub fn get(&self, index: usize) -> [[f64; 3]; 3] {
         match self {
             Triangles::Single { corners, frame } => {
@@ -100,7 +111,8 @@ impl Mesh {
         if unsigned == 0.0 {
             return Err(Error::NoFaces { path: path.into(), triangles: count as u64, up });
         }
-        let lattice = covering(high[0], high[1], step_mm)?;
+        let size = [0, 1].map(|axis| triangles.whole_steps(high[axis], step_mm));
+        let lattice = covering(size[0], size[1], step_mm)?;
         let open = signed.abs() > 1e-6 * unsigned;
         let outward = if (if open { signed } else { volume }) < 0.0 { -1.0 } else { 1.0 };
         let (mut bottom_mm, mut steepest) = (f64::INFINITY, [0.0f64; 2]);
@@ -169,10 +181,12 @@ impl Mesh {
                 // Rounding may leave a border sample's bucket without it; it then takes one step.
                 let to = to.max(from + 1);
                 for &index in buckets.entries(row, column) {
-                    let t = self.triangles.get(index as usize);
+                    let rising = Rising::new(self.triangles.get(index as usize));
                     for row in from_row..to_row {
-                        let line = &mut out[row * xs.len()..][from..to];
-                        fill_span(&t, ys[row], &xs[from..to], line, datum_mm);
+                        if let Some(ends) = rising.cut(ys[row]) {
+                            let line = &mut out[row * xs.len()..][from..to];
+                            fill_span(ends, &xs[from..to], line, datum_mm);
+                        }
                     }
                 }
                 from = to;
@@ -182,55 +196,60 @@ impl Mesh {
     }
 }
 
-/// Raises the samples of one row that a triangle covers to its height. The row cuts the triangle's
-/// edges at two points, and the height between them is linear; an edge is cut the same way from
-/// both its sides.
-fn fill_span(t: &[[f64; 3]; 3], y: f64, xs: &[f64], out: &mut [f32], datum_mm: f64) {
-    let [mut a, mut b, mut c] = *t;
-    if a[1] > b[1] {
-        std::mem::swap(&mut a, &mut b);
-    }
-    if b[1] > c[1] {
-        std::mem::swap(&mut b, &mut c);
-    }
-    if a[1] > b[1] {
-        std::mem::swap(&mut a, &mut b);
-    }
-    if y < a[1] - ON_EDGE_MM || y > c[1] + ON_EDGE_MM || a[1] == c[1] {
-        return;
-    }
-    let y = y.clamp(a[1], c[1]);
-    let cut = |p: [f64; 3], q: [f64; 3]| {
-        if p[1] == q[1] {
-            return [q[0], q[2]];
+/// A triangle with its corners by rising y.
+struct Rising {
+    corners: [[f64; 3]; 3],
+}
+
+impl Rising {
+    fn new([mut a, mut b, mut c]: [[f64; 3]; 3]) -> Rising {
+        if a[1] > b[1] {
+            std::mem::swap(&mut a, &mut b);
         }
-        let t = (y - p[1]) / (q[1] - p[1]);
-        [p[0] + t * (q[0] - p[0]), p[2] + t * (q[2] - p[2])]
-    };
-    let long = cut(a, c);
-    let short = if y > b[1] {
-        cut(b, c)
-    } else if y == b[1] {
-        [b[0], b[2]]
-    } else {
-        cut(a, b)
-    };
-    let (left, right) = if long[0] <= short[0] { (long, short) } else { (short, long) };
-    let from = xs.partition_point(|&x| x < left[0] - ON_EDGE_MM);
-    let width = right[0] - left[0];
-    for (x, z) in xs[from..].iter().zip(&mut out[from..]) {
-        if *x > right[0] + ON_EDGE_MM {
-            break;
+        if b[1] > c[1] {
+            std::mem::swap(&mut b, &mut c);
         }
-        let height = if width > 0.0 {
-            left[1] + (right[1] - left[1]) * ((x - left[0]) / width).clamp(0.0, 1.0)
-        } else {
-            left[1].max(right[1])
+        if a[1] > b[1] {
+            std::mem::swap(&mut a, &mut b);
+        }
+        Rising { corners: [a, b, c] }
+    }
+
+    /// x and z of the two points where a row cuts the edges, from left to right. An edge is cut the
+    /// same way from both its sides.
+    fn cut(&self, y: f64) -> Option<[[f64; 2]; 2]> {
+        let [a, b, c] = self.corners;
+        if y < a[1] - ON_EDGE_MM || y > c[1] + ON_EDGE_MM || a[1] == c[1] {
+            return None;
+        }
+        let y = y.clamp(a[1], c[1]);
+        let cut = |p: [f64; 3], q: [f64; 3]| {
+            let t = (y - p[1]) / (q[1] - p[1]);
+            [p[0] + t * (q[0] - p[0]), p[2] + t * (q[2] - p[2])]
         };
-        let height = (height - datum_mm) as f32;
-        if z.is_nan() || *z < height {
-            *z = height;
-        }
+        let long = cut(a, c);
+        let short = if y == b[1] {
+            [b[0], b[2]]
+        } else if y > b[1] {
+            cut(b, c)
+        } else {
+            cut(a, b)
+        };
+        Some(if long[0] <= short[0] { [long, short] } else { [short, long] })
+    }
+}
+
+/// Raises the samples between two points of a row to the height between them.
+fn fill_span([left, right]: [[f64; 2]; 2], xs: &[f64], out: &mut [f32], datum_mm: f64) {
+    let from = xs.partition_point(|&x| x < left[0] - ON_EDGE_MM);
+    let count = xs[from..].partition_point(|&x| x <= right[0] + ON_EDGE_MM);
+    let width = right[0] - left[0];
+    let (z, slope) =
+        if width > 0.0 { (left[1], (right[1] - left[1]) / width) } else { (left[1].max(right[1]), 0.0) };
+    for (x, out) in xs[from..from + count].iter().zip(&mut out[from..from + count]) {
+        let height = z + slope * (x - left[0]).clamp(0.0, width);
+        // A sample without data gives way to any height.
+        *out = out.max((height - datum_mm) as f32);
     }
 }
 

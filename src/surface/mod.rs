@@ -109,8 +109,8 @@ pub trait Surface: Send + Sync {
 }
 
 macro_rules! forward {
-    ($($pointer:ident),*) => {$(
-        impl<S: Surface + ?Sized> Surface for $pointer<S> {
+    ($($pointer:ty),*) => {$(
+        impl<S: Surface + ?Sized> Surface for $pointer {
             fn lattice(&self) -> Lattice {
                 (**self).lattice()
             }
@@ -138,7 +138,7 @@ macro_rules! forward {
         }
     )*};
 }
-forward!(Arc, Box);
+forward!(&S, Arc<S>, Box<S>);
 
 /// The samples that cover a part, or why there are too many of them.
 fn covering(width_mm: f64, height_mm: f64, step_mm: f64) -> Result<Lattice, Error> {

@@ -118,13 +118,11 @@ impl Raw {
 
 /// Refuses a header whose image cannot be held, before anything is allocated for it.
 pub(super) fn claim(path: &str, columns: u64, rows: u64, bytes: u64) -> Result<(), Error> {
+    if columns == 0 || rows == 0 {
+        return Err(Error::NoSamples { path: path.into(), columns, rows });
+    }
     let side = u64::from(u32::MAX);
-    if columns == 0
-        || rows == 0
-        || columns > side
-        || rows > side
-        || columns as f64 * rows as f64 > MOST_SAMPLES
-    {
+    if columns > side || rows > side || columns as f64 * rows as f64 > MOST_SAMPLES {
         return Err(Error::HugeClaim { path: path.into(), columns, rows, bytes, limit: MOST_SAMPLES });
     }
     Ok(())

@@ -318,3 +318,29 @@ impl Entry {
         Entry { tag, kind: 12, count: values.len() as u64, value }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::tiff::decoder::Decoder;
+    use ::tiff::tags::Tag;
+
+    /// A whole bed at 5 um: past 32 bits of bytes. Its data need not exist to be addressed.
+    #[test]
+    fn past_four_gigabytes_the_head_is_a_big_tiff() {
+        let (columns, rows) = (61_000, 40_700);
+        for (rows, big) in [(17_000, false), (rows, true)] {
+            let head = tiff_head(columns, rows, 0.01);
+            assert_eq!(head[2], if big { 43 } else { 42 });
+            let data = head.len() as u64;
+            let mut decoder = Decoder::new(std::io::Cursor::new(head)).unwrap();
+            assert_eq!(decoder.dimensions().unwrap(), (columns as u32, rows as u32));
+            let offsets = decoder.get_tag_u64_vec(Tag::StripOffsets).unwrap();
+            let counts = decoder.get_tag_u64_vec(Tag::StripByteCounts).unwrap();
+            assert_eq!(offsets[0], data);
+            assert!((1..offsets.len()).all(|k| offsets[k] == offsets[k - 1] + counts[k - 1]));
+            assert_eq!(counts.iter().sum::<u64>(), columns * rows * 4);
+            assert_eq!(decoder.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap()[0], 0.01);
+        }
+    }
+}
