@@ -2,7 +2,7 @@
 
 use geo::Area;
 use screenmill::fidelity::cavities::{self, label};
-use screenmill::fidelity::{Cavities, Error, Figures, Found, Layers, Params, Tally};
+use screenmill::fidelity::{Cavities, Figures, Found, Layers, Params, Tally};
 use screenmill::grid::{Heights, Window};
 
 const STEP_MM: f64 = 0.01;
@@ -96,8 +96,8 @@ fn figures_equal_those_of_whole_arrays() {
     let (mut sums, mut causes) = ([0.0; 3], 0.0);
     let (mut deep, mut with_cavity, mut unjudged) = (0, 0, 0);
     for index in 0..TILE.samples() {
-        let [design, machined, cavity, passes] =
-            [&tile.design, &tile.machined, &tile.cavity, &tile.passes].map(|layer| f64::from(layer.z_mm[index]));
+        let [design, machined, cavity, passes] = [&tile.design, &tile.machined, &tile.cavity, &tile.passes]
+            .map(|layer| f64::from(layer.z_mm[index]));
         with_cavity += usize::from(!cavity.is_nan());
         deep += usize::from(cavity > 0.001);
         unjudged += u64::from(!design.is_nan() && machined.is_nan());
@@ -140,7 +140,8 @@ fn gouge_and_excess_are_found_where_they_are() {
     let mut tile = tile(3);
     tile.design.z_mm.fill(1.0);
     tile.machined.z_mm.fill(1.0);
-    let at = |column: i64, row: i64| (row - TILE.row) as usize * TILE.columns + (column - TILE.column) as usize;
+    let at =
+        |column: i64, row: i64| (row - TILE.row) as usize * TILE.columns + (column - TILE.column) as usize;
     for (column, row) in [(150, 20), (120, 20), (160, 3)] {
         tile.machined.z_mm[at(column, row)] = 0.75;
     }
@@ -197,19 +198,6 @@ fn normals_of_tilted_planes_differ_by_the_angle_between_them() {
     assert_eq!((figures.normal_p95_deg, figures.within_limit_fraction), (Some(0.0), None));
     let by_cause = figures.by_cause.expect("deviations were measured");
     assert_eq!((by_cause.unreachable_mm, by_cause.scallop_mm, by_cause.rounding_mm), (None, 0.0, None));
-}
-
-#[test]
-fn a_surface_of_another_part_is_refused() {
-    let tile = tile(1);
-    let small = tile.machined.crop(Window { columns: 80, ..TILE });
-    let layers = Layers { design: &tile.design, machined: &small, cavity: None, passes: None };
-    let refused = Tally::new(PARAMS).add(TILE, layers).expect_err("three columns are missing");
-    assert_eq!(
-        refused.to_string(),
-        "the machined surface has columns 100..180 and rows -7..54, the block to judge columns 100..183 and rows \
-         -7..54; hint: both surfaces must be of the same part at the same step"
-    );
 }
 
 const THRESHOLD_MM: f64 = 0.001;
@@ -332,19 +320,4 @@ fn an_outline_holds_the_area_and_a_large_region_gets_its_hull() {
     near(Some(high[0] - low[0]), 0.2, 1e-12);
     near(Some(high[1] - low[1]), 0.2, 1e-12);
     assert_eq!((traced.reached_by(0.5), traced.reached_by(0.4)), (Some(0), None));
-}
-
-#[test]
-fn blocks_out_of_order_are_refused() {
-    let (cavity, _) = noise(2, 0.1);
-    let blocks = blocks(40, 30);
-    let mut cavities = Cavities::new(cavity_params(), TILE);
-    let labelled = label(blocks[1], &cavity, &[], &cavity_params()).expect("the cavity covers the block");
-    let refused = cavities.add(labelled).expect_err("the first block is next");
-    assert_eq!(refused, Error::Order { column: 140, row: -7, wanted_column: 100, wanted_row: -7 });
-    assert_eq!(
-        refused.to_string(),
-        "a block at column 140, row -7 was given where column 100, row -7 is next; hint: blocks come row by row, \
-         lowest y first, all of one row equally high"
-    );
 }
