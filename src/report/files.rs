@@ -21,7 +21,9 @@ pub fn write_whole(
         // Temporary files are private; this one becomes a user's file, as far as the umask lets it.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.prefix(".screenmill-").tempfile_in(folder).map_err(failed)?;
+    let file = builder.prefix(".screenmill-").tempfile_in(folder);
+    // The error names the temporary file, which means nothing to a user; its kind is enough.
+    let mut file = file.map_err(|error| failed(error.kind().into()))?;
     let mut writer = BufWriter::new(file.as_file_mut());
     write(&mut writer)?;
     writer.flush().map_err(failed)?;

@@ -3,13 +3,14 @@
 /// A length in micrometres with as many decimals as matter; in millimetres past 1 mm.
 pub fn micrometres(mm: f64) -> String {
     let um = mm * 1000.0;
-    match um.abs() {
+    let text = match um.abs() {
         size if size >= 1000.0 => format!("{mm:.3} mm"),
         size if size >= 100.0 => format!("{um:.0} µm"),
         size if size >= 10.0 => format!("{um:.1} µm"),
         size if size >= 1.0 || size == 0.0 => format!("{um:.2} µm"),
         _ => format!("{um:.3} µm"),
-    }
+    };
+    text.replace('-', "\u{2212}")
 }
 
 /// A fraction in percent; never 100 or 0 unless it is.
@@ -65,6 +66,7 @@ mod tests {
     fn figures_read_as_a_person_would_write_them() {
         assert_eq!(micrometres(0.0015), "1.50 µm");
         assert_eq!(micrometres(0.00004), "0.040 µm");
+        assert_eq!(micrometres(-0.0123), "\u{2212}12.3 µm");
         assert_eq!(micrometres(1.25), "1.250 mm");
         assert_eq!(percent(0.9999), "99.99 %");
         assert_eq!(percent(0.984), "98.4 %");

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::format::{degrees, duration, fixed, micrometres, percent};
 use super::template::{self, Template};
-use super::{Error, Fidelity, Parts, Report};
+use super::{Error, Fidelity, Finding, Parts, Report};
 
 /// What the pages show beside the report itself.
 #[derive(Clone, Debug)]
@@ -188,10 +188,13 @@ fn bars(parts: &Parts) -> Vec<Bar> {
 /// Writes the page, whole or not at all.
 pub fn write_report(path: &Path, page: &Page) -> Result<(), Error> {
     let report = page.report;
+    let mut findings: Vec<&Finding> = report.findings.iter().collect();
+    findings.sort_by_key(|finding| finding.severity);
     let filled = Filled {
         title: &page.title,
         subtitle: &page.subtitle,
         report,
+        findings,
         figures: key_figures(report, &page.limits),
         by_operation: bars(&report.time_s.by_operation),
         by_tool: bars(&report.time_s.by_tool),
@@ -212,6 +215,7 @@ struct Filled<'a> {
     title: &'a str,
     subtitle: &'a str,
     report: &'a Report,
+    findings: Vec<&'a Finding>,
     figures: Vec<KeyFigure>,
     by_operation: Vec<Bar>,
     by_tool: Vec<Bar>,
