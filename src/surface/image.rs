@@ -176,9 +176,7 @@ impl HeightImage {
         for (range, steep) in found {
             self.bottom_mm = self.bottom_mm.min(range[0]);
             self.top_mm = self.top_mm.max(range[1]);
-            for axis in 0..2 {
-                self.steepest[axis] = self.steepest[axis].max(steep[axis]);
-            }
+            self.steepest = [self.steepest[0].max(steep[0]), self.steepest[1].max(steep[1])];
         }
         Ok(())
     }

@@ -161,7 +161,8 @@ fn rotation(faces: &[Triangle]) -> Result<DMat3, Error> {
     let slope_x = (xz * yy - yz * xy) / determinant;
     let slope_y = (yz * xx - xz * xy) / determinant;
     let tilt_deg = slope_x.hypot(slope_y).atan().to_degrees();
-    if !(tilt_deg <= MOST_TILT_DEG) {
+    // A part of no area has no plane: not a number, refused as well.
+    if tilt_deg.is_nan() || tilt_deg > MOST_TILT_DEG {
         return Err(Error::TooSteep { tilt_deg, limit_deg: MOST_TILT_DEG });
     }
     let normal = DVec3::new(-slope_x, -slope_y, 1.0).normalize();
