@@ -23,6 +23,9 @@ pub struct Job {
     pub maps: Maps,
     #[serde(default, rename = "operation")]
     pub operations: Vec<Operation>,
+    /// What programs and pages call the part: the job's folder and file name.
+    #[serde(skip)]
+    pub name: String,
 }
 
 /// What is to be cut: exactly one of `screen`, `design`, `mesh`, `heights`.
@@ -48,15 +51,33 @@ pub struct Part {
     /// Pitch of a height image that carries none.
     pub pixel_mm: Option<f64>,
     /// Unit of a mesh: "mm", "m" or "inch".
-    pub unit: Option<String>,
+    pub unit: Option<Unit>,
     /// Axis of a mesh that points out of the stock: "x", "y" or "z".
-    pub up: Option<String>,
+    pub up: Option<Up>,
     pub z_min_mm: Option<f64>,
     pub z_max_mm: Option<f64>,
 }
 
 fn ten_micrometres() -> f64 {
     0.010
+}
+
+/// Unit of a mesh's numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    Mm,
+    M,
+    Inch,
+}
+
+/// Axis of a mesh that points out of the stock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Up {
+    X,
+    Y,
+    Z,
 }
 
 /// What stands outside the part: nothing, or material to keep up to the stock's top.
@@ -254,6 +275,7 @@ impl Job {
         let mut job: Job = source.parse()?;
         job.check(&source)?;
         let folder = path.parent().unwrap_or(Path::new(""));
+        job.name = name_of(path);
         let part = &mut job.part;
         let files = [&mut part.screen, &mut part.design, &mut part.mesh, &mut part.heights];
         for file in files.into_iter().chain([&mut part.elevation, &mut job.tools.library]).flatten() {
@@ -301,6 +323,14 @@ impl Job {
             ("z_min_mm", part.z_min_mm.is_some(), heights, "heights", leave_out),
             ("z_max_mm", part.z_max_mm.is_some(), heights, "heights", leave_out),
             ("level = \"plane\"", level, !heights, "screen, design or mesh", level_hint),
+            ("level = \"plane\"", level, part.form == Form::Part, "form = \"part\"", "cut the die unlevelled"),
+            (
+                "level = \"plane\"",
+                level,
+                self.stock.blanks == Blanks::PerTile || mesh,
+                "blanks = \"per-tile\"",
+                "tiles of one sheet cannot each be turned",
+            ),
         ];
         for (key, given, allowed, with, hint) in placed {
             if given && !allowed {
@@ -337,6 +367,16 @@ impl Job {
             }
         }
         Ok(())
+    }
+}
+
+/// The file's name, after its folder's where the file is called `job.toml`.
+fn name_of(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let full = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    match full.parent().and_then(Path::file_name) {
+        Some(folder) if stem == "job" => folder.to_string_lossy().into_owned(),
+        _ => stem,
     }
 }
 

@@ -17,8 +17,10 @@
 //! Lengths are millimetres, feeds mm/min, times seconds, spindle speeds rpm; a scene is in
 //! metres. The frame is drawn in [`grid`].
 
+pub mod catalogue;
 pub mod cutter;
 pub mod grid;
+pub mod tolerance;
 pub mod optics;
 pub mod progress;
 pub mod settings;
@@ -42,3 +44,5 @@ pub mod fidelity;
 pub mod report;
 
 pub mod job;
+
+pub mod pipeline;

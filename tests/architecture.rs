@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom; a room imports from rooms above it only.
-const ORDER: [&str; 18] = [
+const ORDER: [&str; 19] = [
     "settings",
+    "catalogue",
     "progress",
     "grid",
     "tolerance",

@@ -37,6 +37,7 @@ pub struct Console {
     quiet: bool,
     verbose: bool,
     terminal: bool,
+    started: Instant,
 }
 
 impl Console {
@@ -46,7 +47,13 @@ impl Console {
             quiet,
             verbose,
             terminal: std::io::stderr().is_terminal(),
+            started: Instant::now(),
         }
+    }
+
+    /// Time since the command began.
+    pub fn wall(&self) -> Duration {
+        self.started.elapsed()
     }
 
     /// Ends the running stage and gives every stage's time in order; a stage that ran more than

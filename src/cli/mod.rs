@@ -1,6 +1,21 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod compensate;
+mod console;
+mod design;
+mod estimate;
+mod fixtures;
+mod machines;
+mod mill;
+mod part;
+mod posts;
+mod program;
+mod raster;
+mod simulate;
+mod staging;
+mod tools;
+
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -34,7 +49,18 @@ pub struct Common {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Mill(mill::Arguments),
+    Estimate(estimate::Arguments),
+    Design(design::Arguments),
+    Raster(raster::Arguments),
+    Compensate(compensate::Arguments),
+    Simulate(simulate::Arguments),
+    Machines(machines::Arguments),
+    Posts(posts::Arguments),
+    Fixtures(fixtures::Arguments),
+    Tools(tools::Arguments),
+}
 
 /// How a command that was not refused ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +84,23 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     }
-    let outcome: Result<Outcome, Refusal> = match arguments.command {};
-    #[allow(unreachable_code)]
+    if let Err(error) = console::listen_for_interrupt() {
+        eprintln!("error: {error}");
+        return ExitCode::from(2);
+    }
+    let common = &arguments.common;
+    let outcome: Result<Outcome, Refusal> = match &arguments.command {
+        Command::Mill(arguments) => mill::run(arguments, common),
+        Command::Estimate(arguments) => estimate::run(arguments, common),
+        Command::Design(arguments) => design::run(arguments, common),
+        Command::Raster(arguments) => raster::run(arguments, common),
+        Command::Compensate(arguments) => compensate::run(arguments, common),
+        Command::Simulate(arguments) => simulate::run(arguments, common),
+        Command::Machines(arguments) => machines::run(arguments, common),
+        Command::Posts(arguments) => posts::run(arguments, common),
+        Command::Fixtures(arguments) => fixtures::run(arguments, common),
+        Command::Tools(arguments) => tools::run(arguments, common),
+    };
     match outcome {
         Ok(Outcome::Within) => ExitCode::SUCCESS,
         Ok(Outcome::Found) => ExitCode::from(1),
@@ -67,5 +108,15 @@ pub fn run() -> ExitCode {
             eprintln!("error: {refusal}");
             ExitCode::from(2)
         }
+    }
+}
+
+/// A machine time as an operator reads it.
+fn hours(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
     }
 }

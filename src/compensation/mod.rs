@@ -1,1 +1,66 @@
 //! Dilation by the cutter, closing and residual on sampled heights.
+//!
+//! ```text
+//!   CL(x)      = max over |d| <= R of h(x + d) + s(d)       lowest z of the cutter that touches h
+//!   closing(x) = min over |d| <= R of CL(x + d) - s(d)      what the cutter leaves at best
+//!   residual   = closing - h >= 0                           what no position of it can remove
+//! ```
+//!
+//! with s(d) = -height of the cutter's profile at |d|, tabulated in f32 from f64. Every function
+//! here gives the bits of the naive double loop over these definitions in f32, whatever the
+//! thread count, the tiling or the processor: (max, +) on the same values does not depend on
+//! order, and samples are left out only where a neighbour is proved to stand higher.
+//!
+//! Heights are mm above a datum near the surface, so that f32 keeps nanometres; NaN and infinite
+//! samples are no data. Outside a window there is no data: pass windows grown by
+//! [`Profile::reach`] (twice that for a closing).
+
+mod ball;
+mod brute;
+mod chord;
+mod contact;
+mod field;
+mod lanes;
+mod pairs;
+mod passes;
+mod profile;
+mod slopes;
+mod stencil;
+mod stream;
+mod tiles;
+
+pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows};
+pub use profile::Profile;
+pub use stream::{Band, stream};
+pub use tiles::{closing, cutter_location, cutter_location_rows, erode, residual};
+
+/// Why a compensation was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    #[error("a pitch of {step_mm} mm is no length; hint: 0.01 is the usual pitch")]
+    Step { step_mm: f64 },
+    #[error("a lateral allowance of {allowance_mm} mm is no length; hint: 0 or more")]
+    Allowance { allowance_mm: f64 },
+    #[error(
+        "cutter {cutter} has a radius of {radius_mm} mm, less than one sample of {step_mm} mm; hint: a finer --step-mm"
+    )]
+    SmallerThanSample { cutter: String, radius_mm: f64, step_mm: f64 },
+    #[error(
+        "cutter {cutter} spans {samples:.0} samples of {step_mm} mm from its axis, {most} at most can be tabulated; hint: a step of {hint_mm:.4} mm or more"
+    )]
+    TooManySamples { cutter: String, samples: f64, most: f64, step_mm: f64, hint_mm: f64 },
+    #[error("every {every} rows: there is no such row; hint: 1 is every row")]
+    Every { every: usize },
+    #[error(
+        "every {every} rows of {step_mm} mm leave strips that cutter {cutter} with a radius of {radius_mm} mm does not touch; hint: --every {most} at most"
+    )]
+    Strips { every: usize, step_mm: f64, cutter: String, radius_mm: f64, most: usize },
+    #[error("the height at column {column}, row {row} is {z_mm}; hint: NaN stands for no data")]
+    Infinite { column: i64, row: i64, z_mm: f32 },
+    #[error("none of the {samples} samples has data")]
+    NoData { samples: usize },
+    #[error(
+        "positions on samples fall below the true drop on a {source_kind}, by up to some um at its steps and ridges; hint: --sampled says that this is meant"
+    )]
+    NotExact { source_kind: &'static str },
+}

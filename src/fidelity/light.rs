@@ -27,7 +27,8 @@ pub struct Pose {
 }
 
 impl Pose {
-    fn point_m(&self, p_mm: DVec3) -> DVec3 {
+    /// A point of the tile's frame in the screen's.
+    pub fn point_m(&self, p_mm: DVec3) -> DVec3 {
         self.origin_m + self.rotation * p_mm * 1e-3
     }
 }

@@ -1,1 +1,13 @@
 //! Half vector, Fresnel reflectance: pure light, no machining.
+
+mod fresnel;
+
+pub use fresnel::ComplexIndex;
+
+use glam::DVec3;
+
+/// The normal of a mirror that sends light from direction `i` to direction `o` (both unit vectors
+/// pointing away from the mirror). NaN where `o` = -`i`.
+pub fn half_vector(i: DVec3, o: DVec3) -> DVec3 {
+    (o + i).normalize()
+}

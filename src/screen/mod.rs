@@ -1,5 +1,30 @@
 //! From a scene to designed cells: the paper's sections 3 and 4.
+//!
+//! The paper is Piovarci, Wessely, Jagielski, Alexa, Matusik and Didyk, "Design and Analysis of
+//! Directional Front Projection Screens". Scenes are in metres, cells in mm.
 
+mod audience;
+mod container;
 mod design;
+mod directions;
+mod elevation;
+mod error;
+mod facets;
+mod make;
+mod microgeometry;
+mod power;
+mod scene;
+mod sight;
+mod solid;
 
-pub use design::{Cell, CellRange, Design, Facet, Profile, Seam};
+pub use audience::{HalfSpace, Polyhedron, View};
+pub use container::ContainerError;
+pub use design::{Cell, CellRange, Design, Facet, FacetPolygon, Profile, Seam};
+pub use directions::{Directions, MOST_SAMPLES, directions};
+pub use elevation::{Elevation, elevation};
+pub use error::Error;
+pub use facets::{Grazing, Wanted, facets};
+pub use make::design;
+pub use microgeometry::{NotConverged, Solution, Workspace, solve};
+pub use scene::{AreaRule, ElevationMethod, Microgeometry, Reflector, Scene};
+pub use solid::SolidError;

@@ -1,4 +1,28 @@
 //! Roughing, parallel finishing and the links between passes, on the controller's own grid.
+//!
+//! ```text
+//!   surface --bands--> strip --row of CL--> envelope --funnel--> pass --pen--> Toolpath
+//!                              (certified between samples)  (few vertices)  (links, retracts)
+//! ```
+//!
+//! Planning is in the tile's frame: X0 Y0 at its lower left corner, z = 0 at its highest design point. Only
+//! the last step, to whole units, moves z to the program's zero.
+
+mod envelope;
+pub mod finish;
+mod funnel;
+mod levels;
+mod link;
+mod passes;
+mod pen;
+pub mod rough;
+mod strip;
+
+pub use passes::{Axis, Layout};
+
+use crate::compensation;
+use crate::surface::{self, Surface};
+use crate::tolerance::Budget;
 
 /// How a move is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,12 +46,132 @@ pub struct Move {
 }
 
 /// One operation's path in the program frame of its tile. `moves[0]` is a rapid that names X and Y at
-/// the clearance plane; `pass_starts` are indices of the moves with which a pass begins, each
-/// reached by a rapid above the stock.
-#[derive(Clone, Debug, Default)]
+/// the clearance plane and the last one is a rapid up to it. `pass_starts` are the indices of the
+/// rapids at the clearance plane that stand over the begin of a pass: a program may start again at
+/// each of them.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Toolpath {
     /// mm per grid unit: 0.01 for RML-1, 0.0001 for LinuxCNC.
     pub unit_mm: f64,
     pub moves: Vec<Move>,
     pub pass_starts: Vec<usize>,
+}
+
+/// Where an operation is planned: the tile, its blank and its controller's grid.
+#[derive(Clone, Copy)]
+pub struct Site<'a> {
+    pub surface: &'a dyn Surface,
+    /// Where the tile's lower left corner lies in the part, in mm: passes of all tiles of a part lie on
+    /// one lattice, so that seams line up.
+    pub origin_mm: [f64; 2],
+    /// Metal around the tile, in mm; past it is air.
+    pub margin_mm: f64,
+    /// The blank's top above the tile's highest design point, in mm.
+    pub top_allowance_mm: f64,
+    /// The program's Z0 above the tile's highest design point, in mm.
+    pub z_zero_mm: f64,
+    /// The retract plane above the blank's top, in mm.
+    pub clearance_mm: f64,
+    /// mm per unit of the controller's grid.
+    pub unit_mm: f64,
+    pub budget: Budget,
+}
+
+/// Receives the part of the work that is done, 0 .. 1.
+pub type Progress<'a> = &'a dyn Fn(f64);
+
+/// Why an operation was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    #[error(
+        "stepover_mm is {stepover_mm}, it must lie above 0 and up to the cutter's diameter of {diameter_mm} mm"
+    )]
+    Stepover { stepover_mm: f64, diameter_mm: f64 },
+    #[error(
+        "a stepover of {stepover_mm:.6} mm is finer than the controller's grid of {unit_mm} mm; hint: {hint}"
+    )]
+    StepoverUnit { stepover_mm: f64, unit_mm: f64, hint: &'static str },
+    #[error(
+        "stepdown_mm is {stepdown_mm}, it must be a number above 0, at least one unit of the controller's grid ({unit_mm} mm)"
+    )]
+    Stepdown { stepdown_mm: f64, unit_mm: f64 },
+    #[error(
+        "scallop_mm is {scallop_mm}, it must lie above 0 and below the tip radius of {cutter}, {tip_radius_mm} mm"
+    )]
+    Scallop { scallop_mm: f64, cutter: String, tip_radius_mm: f64 },
+    #[error(
+        "scallop_mm cannot be kept by {cutter}, which has no round tip; hint: stepover_mm, or a ball or bull cutter"
+    )]
+    ScallopTip { cutter: String },
+    #[error("stock_to_leave_mm is {leave_mm}, it must be 0 or more")]
+    StockToLeave { leave_mm: f64 },
+    #[error("direction_deg is {direction_deg}: passes run along X (0) or along Y (90)")]
+    Direction { direction_deg: f64 },
+    #[error("{name} is {value}, it must be {wanted}")]
+    Number { name: &'static str, value: f64, wanted: &'static str },
+    #[error(
+        "the path reaches {reach_mm:.1} mm, a grid of {unit_mm} mm counts to {limit_mm:.1} mm; hint: smaller tiles or a coarser grid"
+    )]
+    Grid { reach_mm: f64, unit_mm: f64, limit_mm: f64 },
+    #[error("nothing to cut: all {samples} samples of the tile are no data")]
+    NoData { samples: usize },
+    #[error(
+        "nothing to rough: the stock's top stands {above_mm:.3} mm above the lowest roughing position, stock_to_leave_mm is {leave_mm}; hint: leave this operation out"
+    )]
+    NothingToRough { above_mm: f64, leave_mm: f64 },
+    #[error(
+        "one band of passes needs {samples} samples in memory, at most {most} are held; hint: smaller tiles, or a larger step_mm"
+    )]
+    Band { samples: usize, most: usize },
+    #[error(transparent)]
+    Compensation(#[from] compensation::Error),
+    #[error(transparent)]
+    Surface(#[from] surface::Error),
+}
+
+impl Site<'_> {
+    /// Deepest point below the tile's highest, in mm, as a negative number.
+    pub(crate) fn bottom_mm(&self) -> f64 {
+        self.surface.bottom_mm() - self.surface.top_mm()
+    }
+
+    /// Refuses what no path could be planned on. `reach_mm` is how far moves go beyond the tile.
+    fn validate(&self, reach_mm: f64) -> Result<(), Error> {
+        let numbers = [
+            ("the controller's grid", self.unit_mm, self.unit_mm > 0.0, "above 0"),
+            ("margin_mm", self.margin_mm, self.margin_mm >= 0.0, "0 or more"),
+            ("top_allowance_mm", self.top_allowance_mm, self.top_allowance_mm >= 0.0, "0 or more"),
+            ("clearance_mm", self.clearance_mm, self.clearance_mm > 0.0, "above 0"),
+            ("z_zero_mm", self.z_zero_mm, true, "a number"),
+            ("origin_mm", self.origin_mm[0] + self.origin_mm[1], true, "two numbers"),
+        ];
+        for (name, value, holds, wanted) in numbers {
+            if !(value.is_finite() && holds) {
+                return Err(Error::Number { name, value, wanted });
+            }
+        }
+        let lattice = self.surface.lattice();
+        let across = lattice.width_mm.max(lattice.height_mm) + reach_mm;
+        let up = self.top_allowance_mm + self.clearance_mm + self.z_zero_mm.abs() - self.bottom_mm();
+        let farthest_mm =
+            across.max(up) + self.origin_mm[0].abs().max(self.origin_mm[1].abs()) + 2.0 * self.unit_mm;
+        let limit_mm = f64::from(i32::MAX) * self.unit_mm;
+        if farthest_mm.is_nan() || farthest_mm >= limit_mm {
+            return Err(Error::Grid { reach_mm: farthest_mm, unit_mm: self.unit_mm, limit_mm });
+        }
+        Ok(())
+    }
+
+    /// A height of the tile's frame in units of the program's, not yet rounded.
+    fn units(&self, z_mm: f64) -> f64 {
+        (z_mm - self.z_zero_mm) / self.unit_mm
+    }
+
+    /// The lowest whole unit at or above a height of the tile's frame. A height that is a whole number of
+    /// units but for the noise of the division stays where it is.
+    fn unit_above(&self, z_mm: f64) -> i32 {
+        let units = self.units(z_mm);
+        let near = units.round();
+        if (units - near).abs() < 1e-6 { near as i32 } else { units.ceil() as i32 }
+    }
 }

@@ -1,1 +1,20 @@
-//! Reads the text of a program back, sweeps the cutter through the stock, and times the motions. Shares no code with what planned or wrote it.
+//! The judge: reads a program's text back by its own interpreters, cuts it through the stock in
+//! simulation, and times it. It shares no code with what planned or wrote the program.
+
+mod contact;
+mod error;
+mod gcode;
+mod judged;
+mod kinematics;
+mod reading;
+mod rml;
+mod sweep;
+mod text;
+mod time;
+
+pub use error::{Error, Place};
+pub use judged::{Blank, Judged, LateralRapid};
+pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary, Travel};
+pub use sweep::{Bite, ProgramCut, Swept, sweep};
+pub use text::{language, read};
+pub use time::{Clock, Corner, Kinematics, Timing, time};

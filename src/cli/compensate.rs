@@ -1,0 +1,198 @@
+//! `screenmill compensate`: where a cutter can stand over a part, and what it leaves.
+
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use screenmill::compensation::{self, Band, Profile};
+use screenmill::cutter::Shape;
+use screenmill::grid::{Heights, Lattice};
+use screenmill::surface::{HeightWriter, Kind, Opened, Surface, open};
+use serde_json::json;
+
+use super::part::Part;
+use super::{Common, Outcome, Refusal};
+
+/// A residual above this is a cavity and not rounding.
+const CAVITY_MM: f32 = 1e-5;
+
+/// Writes the locations of a cutter over a part, and what it can and cannot reach
+#[derive(clap::Args, Clone, Debug)]
+pub struct Arguments {
+    #[command(flatten)]
+    part: Part,
+    /// Cutter, as ball:0.5, flat:1, bull:2:0.2, vee:60:0.1:6 or taper:0.2:10:3
+    #[arg(long, value_name = "CUTTER")]
+    cutter: Shape,
+    /// File of cutter locations: .tif, .npy or .png
+    #[arg(long, value_name = "FILE")]
+    cl: Option<PathBuf>,
+    /// File of what the cutter leaves at best
+    #[arg(long, value_name = "FILE")]
+    closing: Option<PathBuf>,
+    /// File of closing less part
+    #[arg(long, value_name = "FILE")]
+    residual: Option<PathBuf>,
+    /// Cut rows 0, K, 2K, ... only
+    #[arg(long, value_name = "K", default_value_t = 1)]
+    every: usize,
+    /// Keep to the samples of a design or mesh
+    #[arg(long)]
+    sampled: bool,
+}
+
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
+    let every = arguments.every;
+    if every == 0 {
+        return Err(compensation::Error::Every { every }.into());
+    }
+    let Opened { surface, kind, notes } = open(&arguments.part.part, &arguments.part.options())?;
+    let lattice = surface.lattice();
+    let profile = Profile::new(arguments.cutter, lattice.step_mm, 0.0)?;
+    match kind {
+        Kind::Design if !arguments.sampled => {
+            return Err(compensation::Error::NotExact { source_kind: "design" }.into());
+        }
+        Kind::Mesh if !arguments.sampled => {
+            return Err(compensation::Error::NotExact { source_kind: "mesh" }.into());
+        }
+        _ => {}
+    }
+    let with_closing = arguments.closing.is_some() || arguments.residual.is_some() || arguments.cl.is_none();
+    if with_closing {
+        profile.covers_between(every)?;
+    }
+    let mut files = Files::create(arguments, surface.as_ref(), &lattice)?;
+    let mut found = Found::default();
+    let progress = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new(lattice.rows as u64) };
+    if let Ok(style) = ProgressStyle::with_template("compensate {wide_bar} {pos}/{len} rows {eta}") {
+        progress.set_style(style);
+    }
+    compensation::stream(
+        &lattice,
+        &profile,
+        every,
+        with_closing,
+        |window| Ok::<_, Refusal>(surface.heights(window, 0.0)?),
+        |band| {
+            found.see(&band)?;
+            progress.inc(band.heights.window.rows as u64);
+            files.write(&band)
+        },
+    )?;
+    progress.finish_and_clear();
+    if found.samples == 0 {
+        return Err(compensation::Error::NoData { samples: lattice.window().samples() }.into());
+    }
+    let names = files.finish()?;
+    let Lattice { columns, rows, step_mm, .. } = lattice;
+    let cutter = arguments.cutter.to_string();
+    let residual = with_closing.then(|| {
+        let area_mm2 = found.cavity_samples as f64 * step_mm * step_mm;
+        let fraction = found.cavity_samples as f64 / found.samples as f64;
+        (f64::from(found.residual_max_mm), area_mm2, fraction)
+    });
+    if common.json {
+        let report = json!({
+            "files": names, "cutter": cutter, "columns": columns, "rows": rows, "step_mm": step_mm,
+            "every": every, "no_data": lattice.window().samples() as u64 - found.samples,
+            "residual": residual.map(|(max_mm, area_mm2, fraction)| json!({
+                "max_mm": max_mm, "cavity_area_mm2": area_mm2, "cavity_area_fraction": fraction,
+            })),
+            "notes": notes,
+        });
+        println!("{report}");
+    } else {
+        println!("{columns} x {rows} samples at {step_mm} mm under {cutter}, every {every} rows");
+        for name in &names {
+            println!("{name}");
+        }
+        if let Some((max_mm, area_mm2, fraction)) = residual {
+            let percent = 100.0 * fraction;
+            println!("out of reach: {max_mm:.6} mm at most, {area_mm2:.4} mm2 ({percent:.2} %)");
+        }
+        for note in &notes {
+            println!("note: {note}");
+        }
+    }
+    Ok(Outcome::Within)
+}
+
+/// What was found on the way.
+#[derive(Default)]
+struct Found {
+    samples: u64,
+    residual_max_mm: f32,
+    cavity_samples: u64,
+}
+
+impl Found {
+    fn see(&mut self, band: &Band) -> Result<(), compensation::Error> {
+        let window = band.heights.window;
+        for (i, &z_mm) in band.heights.z_mm.iter().enumerate() {
+            if z_mm.is_infinite() {
+                let column = (i % window.columns) as i64;
+                return Err(compensation::Error::Infinite {
+                    column,
+                    row: window.row + (i / window.columns) as i64,
+                    z_mm,
+                });
+            }
+            self.samples += u64::from(!z_mm.is_nan());
+        }
+        for &residual_mm in band.residual.iter().flat_map(|residual| &residual.z_mm) {
+            self.residual_max_mm = self.residual_max_mm.max(residual_mm);
+            self.cavity_samples += u64::from(residual_mm > CAVITY_MM);
+        }
+        Ok(())
+    }
+}
+
+/// The files asked for; none has its name before all are whole.
+struct Files {
+    cl: Option<(String, HeightWriter)>,
+    closing: Option<(String, HeightWriter)>,
+    residual: Option<(String, HeightWriter)>,
+}
+
+impl Files {
+    fn create(arguments: &Arguments, surface: &dyn Surface, lattice: &Lattice) -> Result<Files, Refusal> {
+        let range_mm = [surface.bottom_mm(), surface.top_mm()];
+        let create = |path: &Option<PathBuf>, rows: usize, range_mm: [f64; 2]| {
+            let create = |path: &PathBuf| -> Result<(String, HeightWriter), Refusal> {
+                let writer = HeightWriter::create(path, lattice.columns, rows, lattice.step_mm, range_mm)?;
+                Ok((name(path), writer))
+            };
+            path.as_ref().map(create).transpose()
+        };
+        Ok(Files {
+            cl: create(&arguments.cl, lattice.rows.div_ceil(arguments.every), range_mm)?,
+            closing: create(&arguments.closing, lattice.rows, range_mm)?,
+            residual: create(&arguments.residual, lattice.rows, [0.0, range_mm[1] - range_mm[0]])?,
+        })
+    }
+
+    fn write(&mut self, band: &Band) -> Result<(), Refusal> {
+        let write = |to: &mut Option<(String, HeightWriter)>, heights: Option<&Heights>| {
+            if let (Some((_, writer)), Some(heights)) = (to, heights) {
+                writer.write(heights)?;
+            }
+            Ok::<(), Refusal>(())
+        };
+        write(&mut self.cl, Some(&band.cl))?;
+        write(&mut self.closing, band.closing.as_ref())?;
+        write(&mut self.residual, band.residual.as_ref())
+    }
+
+    fn finish(self) -> Result<Vec<String>, Refusal> {
+        let mut names = Vec::new();
+        for (name, writer) in [self.cl, self.closing, self.residual].into_iter().flatten() {
+            writer.finish()?;
+            names.push(name);
+        }
+        Ok(names)
+    }
+}
+
+fn name(path: &Path) -> String {
+    path.display().to_string()
+}

@@ -1,0 +1,43 @@
+//! What a command says about the part it reads, beside its file name.
+
+use std::path::PathBuf;
+
+use screenmill::surface::{Options, Unit, Up};
+
+/// A part and how to read it.
+#[derive(clap::Args, Clone, Debug)]
+pub struct Part {
+    /// Designed cells (.npz), a mesh (.stl) or heights (.tif, .png, .npy)
+    pub part: PathBuf,
+    /// Distance of the samples in mm
+    #[arg(long, value_name = "MM", default_value_t = 0.01, allow_negative_numbers = true)]
+    pub step_mm: f64,
+    /// Pitch in mm of heights whose file carries none
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub pixel_mm: Option<f64>,
+    /// Unit of a mesh: mm, m or inch
+    #[arg(long, default_value = "mm")]
+    pub unit: Unit,
+    /// Axis of a mesh that points out of the stock: x, y or z
+    #[arg(long, default_value = "z")]
+    pub up: Up,
+    /// Height in mm of an integer image's darkest value
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub z_min_mm: Option<f64>,
+    /// Height in mm of an integer image's brightest value
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub z_max_mm: Option<f64>,
+}
+
+impl Part {
+    pub fn options(&self) -> Options {
+        Options {
+            step_mm: self.step_mm,
+            pixel_mm: self.pixel_mm,
+            unit: self.unit,
+            up: self.up,
+            z_min_mm: self.z_min_mm,
+            z_max_mm: self.z_max_mm,
+        }
+    }
+}

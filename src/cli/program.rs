@@ -1,0 +1,63 @@
+//! Program files as arguments.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use screenmill::verify::{self, Event, Extent, Options, Reading, Summary};
+use serde_json::{Value, json};
+
+/// Bytes read ahead: long enough for a header, so that the language is found.
+const BUFFER: usize = 1 << 16;
+
+/// A program's text was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum Refused {
+    #[error("{path}: {source}")]
+    Open { path: PathBuf, source: std::io::Error },
+    #[error("{path}: {source}")]
+    Text { path: PathBuf, source: verify::Error },
+}
+
+fn open(path: &Path) -> Result<BufReader<File>, Refused> {
+    let file = File::open(path).map_err(|source| Refused::Open { path: path.into(), source })?;
+    Ok(BufReader::with_capacity(BUFFER, file))
+}
+
+/// Reads a program whole.
+pub fn read(path: &Path) -> Result<Reading, Refused> {
+    Reading::from(&mut open(path)?, &Options::default())
+        .map_err(|source| Refused::Text { path: path.into(), source })
+}
+
+/// Reads a program event by event; a text without a motion is refused.
+pub fn stream(path: &Path, each: &mut dyn FnMut(&Event)) -> Result<Summary, Refused> {
+    let refused = |source| Refused::Text { path: path.into(), source };
+    let mut moved = false;
+    let summary = verify::read(&mut open(path)?, &Options::default(), &mut |event| {
+        moved |= matches!(event, Event::Move(_));
+        each(event);
+        Ok(())
+    })
+    .map_err(refused)?;
+    if moved { Ok(summary) } else { Err(refused(verify::Error::Empty)) }
+}
+
+/// Bounds as the reports have them; None where no motion was placed.
+pub fn bounds(extent: &Extent) -> Value {
+    let axis = |axis: usize| {
+        let (low, high) = (extent.low_mm[axis], extent.high_mm[axis]);
+        if low <= high { json!([low, high]) } else { Value::Null }
+    };
+    json!({ "x": axis(0), "y": axis(1), "z": axis(2) })
+}
+
+/// A time as an operator says it.
+pub fn clock(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match (whole / 3600, whole / 60 % 60, whole % 60) {
+        (0, 0, _) => format!("{seconds:.1} s"),
+        (0, minutes, rest) => format!("{minutes} min {rest:02} s"),
+        (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
+    }
+}

@@ -1,0 +1,223 @@
+//! The one inner loop, and how it is compiled for the processor at hand.
+//!
+//! Every kernel works on whole groups of [`LANES`] samples: a group may run past the samples it
+//! is meant for, because any sample that lies under the cutter may raise the cutter, and padding
+//! holds [`NONE`]. Groups leave no tails, so the same code is vectorised for any width, and
+//! (max, +) in f32 gives the same bits for all of them.
+
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64 as x86;
+
+/// Samples that a kernel takes at once.
+pub(super) const LANES: usize = 16;
+
+/// No data, inside kernels: far below any height, and finite, so that differences are numbers.
+pub(super) const NONE: f32 = -1e30;
+
+/// Everything below this came from [`NONE`].
+pub(super) const LEAST: f32 = -1e29;
+
+/// `count` rounded up to whole groups.
+#[inline(always)]
+pub(super) fn whole_groups(count: usize) -> usize {
+    count.div_ceil(LANES) * LANES
+}
+
+/// A group of [`LANES`] heights and what an instruction set does with it.
+///
+/// Plain loops over arrays were tried: whether the compiler makes vectors of them changes with the
+/// optimization level and with what they are inlined into, by a factor of ten.
+pub(super) trait Vectors {
+    type Group: Copy;
+
+    fn splat(z: f32) -> Self::Group;
+    fn load(z: &[f32; LANES]) -> Self::Group;
+    fn store(group: Self::Group, z: &mut [f32; LANES]);
+    fn add(a: Self::Group, b: Self::Group) -> Self::Group;
+    /// The greater of each lane; lanes are numbers and never -0.
+    fn greater(a: Self::Group, b: Self::Group) -> Self::Group;
+}
+
+/// Any processor.
+pub(super) struct Portable;
+
+impl Vectors for Portable {
+    type Group = [f32; LANES];
+
+    #[inline(always)]
+    fn splat(z: f32) -> Self::Group {
+        [z; LANES]
+    }
+
+    #[inline(always)]
+    fn load(z: &[f32; LANES]) -> Self::Group {
+        *z
+    }
+
+    #[inline(always)]
+    fn store(group: Self::Group, z: &mut [f32; LANES]) {
+        *z = group;
+    }
+
+    #[inline(always)]
+    fn add(a: Self::Group, b: Self::Group) -> Self::Group {
+        std::array::from_fn(|lane| a[lane] + b[lane])
+    }
+
+    #[inline(always)]
+    fn greater(a: Self::Group, b: Self::Group) -> Self::Group {
+        std::array::from_fn(|lane| if a[lane] > b[lane] { a[lane] } else { b[lane] })
+    }
+}
+
+/// x86 with 256 bits; only for code that is compiled for and run on such a processor.
+#[cfg(target_arch = "x86_64")]
+pub(super) struct Avx2;
+
+// SAFETY of every block in this and the next impl: the instructions are there, because [`widest`]
+// runs this code only where the processor was found to have them; loads and stores are of whole
+// arrays behind references and need no alignment.
+#[cfg(target_arch = "x86_64")]
+impl Vectors for Avx2 {
+    type Group = [x86::__m256; 2];
+
+    #[inline(always)]
+    fn splat(z: f32) -> Self::Group {
+        unsafe { [x86::_mm256_set1_ps(z); 2] }
+    }
+
+    #[inline(always)]
+    fn load(z: &[f32; LANES]) -> Self::Group {
+        unsafe { [x86::_mm256_loadu_ps(z.as_ptr()), x86::_mm256_loadu_ps(z.as_ptr().add(8))] }
+    }
+
+    #[inline(always)]
+    fn store(group: Self::Group, z: &mut [f32; LANES]) {
+        unsafe {
+            x86::_mm256_storeu_ps(z.as_mut_ptr(), group[0]);
+            x86::_mm256_storeu_ps(z.as_mut_ptr().add(8), group[1]);
+        }
+    }
+
+    #[inline(always)]
+    fn add(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_add_ps(a[0], b[0]), x86::_mm256_add_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn greater(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_max_ps(a[0], b[0]), x86::_mm256_max_ps(a[1], b[1])] }
+    }
+}
+
+/// x86 with 512 bits; as [`Avx2`].
+#[cfg(target_arch = "x86_64")]
+pub(super) struct Avx512;
+
+#[cfg(target_arch = "x86_64")]
+impl Vectors for Avx512 {
+    type Group = x86::__m512;
+
+    #[inline(always)]
+    fn splat(z: f32) -> Self::Group {
+        unsafe { x86::_mm512_set1_ps(z) }
+    }
+
+    #[inline(always)]
+    fn load(z: &[f32; LANES]) -> Self::Group {
+        unsafe { x86::_mm512_loadu_ps(z.as_ptr()) }
+    }
+
+    #[inline(always)]
+    fn store(group: Self::Group, z: &mut [f32; LANES]) {
+        unsafe { x86::_mm512_storeu_ps(z.as_mut_ptr(), group) }
+    }
+
+    #[inline(always)]
+    fn add(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_add_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn greater(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_max_ps(a, b) }
+    }
+}
+
+/// The whole groups of a slice.
+#[inline(always)]
+pub(super) fn groups(z: &[f32]) -> &[[f32; LANES]] {
+    z.as_chunks().0
+}
+
+/// The whole groups of a slice, to write.
+#[inline(always)]
+pub(super) fn groups_mut(z: &mut [f32]) -> &mut [[f32; LANES]] {
+    z.as_chunks_mut().0
+}
+
+/// out = max(out, input + s), over whole groups.
+#[inline(always)]
+pub(super) fn raise<V: Vectors>(out: &mut [f32], input: &[f32], s: f32) {
+    let s = V::splat(s);
+    for (out, input) in groups_mut(out).iter_mut().zip(groups(input)) {
+        V::store(V::greater(V::add(V::load(input), s), V::load(out)), out);
+    }
+}
+
+/// out = max(out, a, b), over whole groups.
+#[inline(always)]
+pub(super) fn raise_both<V: Vectors>(out: &mut [f32], a: &[f32], b: &[f32]) {
+    for ((out, a), b) in groups_mut(out).iter_mut().zip(groups(a)).zip(groups(b)) {
+        V::store(V::greater(V::greater(V::load(a), V::load(b)), V::load(out)), out);
+    }
+}
+
+/// out = max(a, b), over whole groups.
+#[inline(always)]
+pub(super) fn higher<V: Vectors>(out: &mut [f32], a: &[f32], b: &[f32]) {
+    for ((out, a), b) in groups_mut(out).iter_mut().zip(groups(a)).zip(groups(b)) {
+        V::store(V::greater(V::load(a), V::load(b)), out);
+    }
+}
+
+/// Defines `$name`, which runs the generic function `$body::<V, P>` with the widest vectors that
+/// this processor has.
+macro_rules! widest {
+    ($(#[$doc:meta])* fn $name:ident<$generic:ident: $bound:path>($($arg:ident: $kind:ty),* $(,)?) = $body:ident) => {
+        $(#[$doc])*
+        pub(super) fn $name<$generic: $bound>($($arg: $kind),*) {
+            #[cfg(target_arch = "x86_64")]
+            {
+                use $crate::compensation::lanes::{Avx2, Avx512};
+                #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,lzcnt,popcnt")]
+                fn avx512<$generic: $bound>($($arg: $kind),*) {
+                    $body::<Avx512, $generic>($($arg),*)
+                }
+                #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+                fn avx2<$generic: $bound>($($arg: $kind),*) {
+                    $body::<Avx2, $generic>($($arg),*)
+                }
+                let with_avx2 = is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("bmi1")
+                    && is_x86_feature_detected!("bmi2")
+                    && is_x86_feature_detected!("lzcnt");
+                if with_avx2
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512bw")
+                {
+                    // SAFETY: the features were found on this processor.
+                    return unsafe { avx512($($arg),*) };
+                }
+                if with_avx2 {
+                    // SAFETY: the features were found on this processor.
+                    return unsafe { avx2($($arg),*) };
+                }
+            }
+            $body::<$crate::compensation::lanes::Portable, $generic>($($arg),*)
+        }
+    };
+}
+pub(super) use widest;

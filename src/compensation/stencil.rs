@@ -1,0 +1,108 @@
+use super::Profile;
+use super::lanes::{LANES, NONE};
+
+/// One row of a stencil: the samples dx in `lo ..= hi` columns from the cutter's axis, of which
+/// `flat_lo ..= flat_hi` lie under its flat bottom. Empty when lo > hi.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arc {
+    pub lo: i32,
+    pub hi: i32,
+    pub flat_lo: i32,
+    pub flat_hi: i32,
+    /// s(dx) stands at `base - dx` of the stencil's values: reversed, because the cutter
+    /// positions that one sample touches run against dx.
+    base: usize,
+}
+
+impl Arc {
+    /// Its columns as two spans, either of which may be empty; without those under the flat
+    /// bottom if these are to be left out.
+    #[inline(always)]
+    pub fn spans(&self, skip_flat: bool) -> [[i32; 2]; 2] {
+        if skip_flat && self.flat_lo <= self.flat_hi {
+            [[self.lo, self.flat_lo - 1], [self.flat_hi + 1, self.hi]]
+        } else {
+            [[self.lo, self.hi], [1, 0]]
+        }
+    }
+}
+
+/// s(d) in f32 on a lattice of offsets that is off the whole pitches by a fraction: entry (k, dx)
+/// is for a sample ((dx + fx), (k + fy)) pitches from the cutter's axis.
+#[derive(Clone, Debug)]
+pub(super) struct Stencil {
+    pub fx: f64,
+    pub fy: f64,
+    first: i64,
+    arcs: Vec<Arc>,
+    values: Vec<f32>,
+    /// More than rounding can shift the difference of two entries, in mm.
+    pub slack_mm: f32,
+}
+
+/// An arc with its values.
+#[derive(Clone, Copy)]
+pub(super) struct ArcRef<'a> {
+    pub arc: Arc,
+    pub values: &'a [f32],
+}
+
+impl ArcRef<'_> {
+    /// s at a column of this arc.
+    #[inline(always)]
+    pub fn s(&self, dx: i32) -> f32 {
+        self.values[(self.arc.base as i64 - dx as i64) as usize]
+    }
+
+    /// Where s(dx) stands in `values`; larger dx come before it. dx may lie LANES outside.
+    #[inline(always)]
+    pub fn index(&self, dx: i32) -> usize {
+        (self.arc.base as i64 - dx as i64) as usize
+    }
+}
+
+impl Stencil {
+    pub fn new(profile: &Profile, fx: f64, fy: f64) -> Stencil {
+        let step_mm = profile.step_mm();
+        let reach = profile.reach() as i64 + 1;
+        let plateau_mm = profile.plateau_mm();
+        let mut arcs = Vec::new();
+        let mut values = vec![NONE; LANES];
+        let mut deepest = 0.0f32;
+        let mut row = Vec::new();
+        for k in -reach..=reach {
+            let dy_mm = (k as f64 + fy) * step_mm;
+            let (mut lo, mut hi, mut flat_lo, mut flat_hi) = (1, 0, 1, 0);
+            row.clear();
+            for dx in -reach..=reach {
+                let dx_mm = (dx as f64 + fx) * step_mm;
+                let distance_mm = (dx_mm * dx_mm + dy_mm * dy_mm).sqrt();
+                let Some(s_mm) = profile.s_mm(distance_mm) else { continue };
+                if lo > hi {
+                    lo = dx as i32;
+                }
+                hi = dx as i32;
+                row.push(s_mm as f32);
+                deepest = deepest.min(s_mm as f32);
+                if s_mm == 0.0 && distance_mm <= plateau_mm {
+                    if flat_lo > flat_hi {
+                        flat_lo = dx as i32;
+                    }
+                    flat_hi = dx as i32;
+                }
+            }
+            let base = (values.len() as i64 + hi as i64) as usize;
+            values.extend(row.iter().rev());
+            values.extend([NONE; LANES]);
+            arcs.push(Arc { lo, hi, flat_lo, flat_hi, base });
+        }
+        Stencil { fx, fy, first: -reach, arcs, values, slack_mm: 4.0 * deepest.abs() * f32::EPSILON }
+    }
+
+    /// The samples k rows above the axis.
+    #[inline(always)]
+    pub fn arc(&self, k: i64) -> Option<ArcRef<'_>> {
+        let arc = *self.arcs.get(usize::try_from(k - self.first).ok()?)?;
+        (arc.lo <= arc.hi).then_some(ArcRef { arc, values: &self.values })
+    }
+}

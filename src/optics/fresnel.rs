@@ -1,0 +1,74 @@
+/// A metal's refractive index n + i k, relative to air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ComplexIndex {
+    pub n: f64,
+    pub k: f64,
+}
+
+impl ComplexIndex {
+    /// The metals that can be named in a scene. Aluminium stands as the published screen's Fresnel
+    /// term uses it.
+    const NAMED: [(&'static str, ComplexIndex); 1] = [("aluminium", ComplexIndex { n: 1.0, k: 6.4 })];
+
+    /// The index of a metal by its name.
+    pub fn named(name: &str) -> Option<ComplexIndex> {
+        Self::NAMED.iter().find(|(known, _)| *known == name).map(|(_, index)| *index)
+    }
+
+    /// The names that [`ComplexIndex::named`] knows.
+    pub fn names() -> Vec<&'static str> {
+        Self::NAMED.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// Reflectance (0 to 1) of a smooth surface for unpolarised light whose direction makes an
+    /// angle with the normal of this cosine. Exact for a conductor in air (Born and Wolf,
+    /// Principles of Optics, 14.2): the mean of the two polarisations.
+    pub fn reflectance(&self, cosine: f64) -> f64 {
+        let (cos2, sin2) = (cosine * cosine, 1.0 - cosine * cosine);
+        let t = self.n * self.n - self.k * self.k - sin2;
+        let a2b2 = (t * t + 4.0 * self.n * self.n * self.k * self.k).sqrt();
+        let a = (0.5 * (a2b2 + t)).max(0.0).sqrt();
+        let ac = 2.0 * a * cosine;
+        let s = (a2b2 + cos2 - ac) / (a2b2 + cos2 + ac);
+        let p = s * (cos2 * a2b2 + sin2 * sin2 - ac * sin2) / (cos2 * a2b2 + sin2 * sin2 + ac * sin2);
+        0.5 * (s + p)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALUMINIUM: ComplexIndex = ComplexIndex { n: 1.0, k: 6.4 };
+
+    #[test]
+    fn normal_incidence_has_its_closed_form() {
+        for index in [ALUMINIUM, ComplexIndex { n: 0.2, k: 3.4 }, ComplexIndex { n: 1.5, k: 0.0 }] {
+            let ComplexIndex { n, k } = index;
+            let expected = ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k);
+            assert!((index.reflectance(1.0) - expected).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn grazing_light_is_reflected_whole() {
+        assert!((ALUMINIUM.reflectance(0.0) - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_lossless_glass_hides_its_p_light_at_brewsters_angle() {
+        let glass = ComplexIndex { n: 1.5, k: 0.0 };
+        let cosine = 1.5_f64.atan().cos();
+        let refracted = (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
+        let s = ((cosine - 1.5 * refracted) / (cosine + 1.5 * refracted)).powi(2);
+        assert!((glass.reflectance(cosine) - 0.5 * s).abs() < 1e-14);
+    }
+
+    #[test]
+    fn aluminium_is_flat_up_to_45_degrees() {
+        let normal = ALUMINIUM.reflectance(1.0);
+        assert!((normal - 0.9110).abs() < 1e-4);
+        assert!((ALUMINIUM.reflectance(45f64.to_radians().cos()) / normal - 1.0).abs() < 0.005);
+        assert!((ALUMINIUM.reflectance(60f64.to_radians().cos()) / normal - 1.0).abs() < 0.017);
+    }
+}

@@ -1,0 +1,237 @@
+//! `mill`: every tile planned, written, read back and judged.
+
+use std::path::{Path, PathBuf};
+
+use super::judge::{Case, Verdict, judge};
+use super::light::Sight;
+use super::maps::Maps;
+use super::part::Part;
+use super::plan::{self, PostPrograms, TileSetup};
+use super::shop::Shop;
+use super::{Error, report};
+use crate::compensation::Profile;
+use crate::fidelity::{self, Tally};
+use crate::job::{Blanks, Job};
+use crate::machine::{self, Setup};
+use crate::progress::Progress;
+use crate::report::Report;
+use crate::verify::{Blank, Judged, LateralRapid};
+
+/// Pieces of a part are not made shorter than this to save travel in Z.
+const SMALLEST_TILE_MM: f64 = 20.0;
+
+/// Cutters tried beyond the job's own on what they leave.
+const CANDIDATES: usize = 2;
+
+/// A judged job.
+pub struct Milled {
+    pub report: Report,
+    /// For each tile, the command that repeats its judgement from its files.
+    pub simulate: Vec<String>,
+}
+
+/// One tile with its programs and what became of it.
+pub struct TileResult {
+    pub tile: TileSetup,
+    pub posts: Vec<PostPrograms>,
+    pub verdict: Verdict,
+    /// For each post and program, in run order.
+    pub lateral_rapids: Vec<Vec<Option<LateralRapid>>>,
+    pub maps: crate::report::MapFiles,
+    pub map_factor: usize,
+    /// Names of the cutters that were tried on the cavities, largest first.
+    pub candidates: Vec<String>,
+}
+
+/// Cuts a job under `staging`. `folder` is the job's own, where it looks for its files.
+pub fn mill(job: &Job, folder: &Path, staging: &Path, progress: &dyn Progress) -> Result<Milled, Error> {
+    let shop = Shop::open(job, folder)?;
+    let part = Part::load(job, progress)?;
+    if let (Some(limit), None) = (job.limits.on_audience_min, &part.scene) {
+        return Err(Error::NoLight { limit, what: "not designed from a scene" });
+    }
+    let tiles = setups(job, &shop, &part)?;
+    let mut results = Vec::new();
+    for tile in tiles {
+        let mut posts = Vec::new();
+        for dialect in &shop.dialects {
+            posts.push(plan::programs(job, &shop, &tile, dialect, staging, progress)?);
+        }
+        results.push(judged(job, &shop, &part, tile, posts, staging, progress)?);
+    }
+    report::finish(job, &shop, &part, results, staging)
+}
+
+/// The tiles of a part, each checked against machine, blank and cutters before anything is planned.
+pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Error> {
+    let steepest = part.whole.steepest();
+    let step_mm = job.part.step_mm;
+    let overruns = shop.tools.iter().map(|tool| plan::overrun_mm(&tool.shape, steepest, step_mm));
+    let overrun_mm = overruns.fold(0.0, f64::max);
+    let part_top_mm = part.whole.top_mm();
+    let size_mm = part.size_mm();
+    let put = |tile: &machine::Tile| -> Result<TileSetup, Error> {
+        let piece = part.tile(job, tile)?;
+        let setup = Setup::place(tile.clone(), size_mm, &shop.stock, &shop.machine, &shop.fixture);
+        Ok(TileSetup::new(job, shop, setup, piece, part_top_mm))
+    };
+    let tiles = machine::split_in_z(
+        size_mm,
+        part.quantum(),
+        overrun_mm,
+        SMALLEST_TILE_MM,
+        &shop.stock,
+        &shop.machine,
+        &shop.fixture,
+        |tile| Ok::<_, Error>(put(tile)?.need(job)),
+    )?;
+    let mut setups = Vec::new();
+    for tile in &tiles {
+        let setup = put(tile)?;
+        let need = setup.need(job);
+        machine::floor_mm(&tile.name, need, &shop.stock)?;
+        for tool in &shop.tools {
+            tool.check_reach(need.depth_mm + need.top_allowance_mm)?;
+        }
+        setups.push(setup);
+    }
+    Ok(setups)
+}
+
+/// Profiles of cutters without repetition, in order.
+fn distinct(shapes: impl Iterator<Item = crate::cutter::Shape>, step_mm: f64) -> Result<Vec<Profile>, Error> {
+    let mut profiles: Vec<Profile> = Vec::new();
+    for shape in shapes {
+        if !profiles.iter().any(|profile| profile.shape() == shape) {
+            profiles.push(Profile::new(shape, step_mm, 0.0)?);
+        }
+    }
+    Ok(profiles)
+}
+
+fn judged(
+    job: &Job,
+    shop: &Shop,
+    part: &Part,
+    tile: TileSetup,
+    posts: Vec<PostPrograms>,
+    staging: &Path,
+    progress: &dyn Progress,
+) -> Result<TileResult, Error> {
+    let surface = tile.surface();
+    let lattice = surface.lattice();
+    let step_mm = lattice.step_mm;
+    let blank = blank(job, part, &tile);
+    let zero_mm = [0.0, 0.0, tile.z_zero_mm];
+    let judged: Vec<Vec<Judged>> = posts
+        .iter()
+        .map(|post| {
+            let programs = post.programs.iter();
+            programs.map(|p| Judged::new(&p.reading, shop.tools[p.operation].shape, zero_mm)).collect()
+        })
+        .collect();
+    let lateral_rapids = judged
+        .iter()
+        .map(|programs| programs.iter().map(|program| program.lateral_rapid(&blank)).collect())
+        .collect();
+    let cutters = distinct(shop.tools.iter().map(|tool| tool.shape), step_mm)?;
+    let (names, candidates) = candidates(shop, step_mm)?;
+    let steepest = surface.steepest();
+    let sight = match (part.pose(job, &tile.piece), &part.scene) {
+        (Some(pose), Some(scene)) => Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]) }),
+        _ => None,
+    };
+    let case = Case {
+        surface,
+        blank,
+        posts: &judged,
+        cutters: &cutters,
+        candidates: &candidates,
+        passes: &posts[0].passes,
+        tally: fidelity::Params { step_mm, limit_mm: Some(job.limits.deviation_or_default_mm()) },
+        cavities: fidelity::cavities::Params::at_step(step_mm),
+        sight: sight.as_ref(),
+    };
+    progress.begin("judge", (lattice.columns * lattice.rows) as u64);
+    let offset_mm = tile.piece.origin_mm.z;
+    let mut maps = Maps::create(staging, &tile.setup.tile.name, &lattice, job.maps.full, offset_mm)?;
+    let verdict = judge(&case, progress, &mut |strip| maps.push(&strip))?;
+    progress.begin("maps", 1);
+    let at = &tile.setup.tile;
+    let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;
+    drop(judged);
+    Ok(TileResult { tile, posts, verdict, lateral_rapids, maps, map_factor, candidates: names })
+}
+
+/// What a picture says at its foot.
+fn notes(job: &Job, verdict: &Verdict) -> Vec<String> {
+    let figures = verdict.tallies[0].figures();
+    let um = |mm: f64| format!("{:.1} um", mm * 1e3);
+    vec![
+        format!(
+            "sampled every {} um, judged on the read-back programs; deepest gouge {} of {} allowed",
+            job.part.step_mm * 1e3,
+            um(figures.gouge_max_mm),
+            um(job.limits.gouge_or_default_mm())
+        ),
+        format!(
+            "99 % of the area within {}; {} cavities deeper than 1 um on {:.2} % of it",
+            um(figures.deviation_p99_mm.unwrap_or_default()),
+            verdict.cavities.count,
+            100.0 * figures.cavity_area_fraction.unwrap_or_default()
+        ),
+    ]
+}
+
+/// The metal around a tile, in the tile's frame.
+fn blank(job: &Job, part: &Part, tile: &TileSetup) -> Blank {
+    let margin_mm = job.stock.margin_mm;
+    let lattice = tile.surface().lattice();
+    let (low, high) = match job.stock.blanks {
+        Blanks::PerTile => ([0.0; 2], [lattice.width_mm, lattice.height_mm]),
+        Blanks::One => {
+            let (at, size) = (&tile.setup.tile, part.size_mm());
+            ([-at.x_mm, -at.y_mm], [size[0] - at.x_mm, size[1] - at.y_mm])
+        }
+    };
+    Blank {
+        low_mm: low.map(|v| v - margin_mm),
+        high_mm: high.map(|v| v + margin_mm),
+        top_mm: tile.allowance_mm,
+    }
+}
+
+/// The library's cutters below the job's smallest, largest first.
+fn candidates(shop: &Shop, step_mm: f64) -> Result<(Vec<String>, Vec<Profile>), Error> {
+    let smallest = shop.tools.iter().map(|tool| tool.shape.radius_mm()).fold(f64::INFINITY, f64::min);
+    let mut tools: Vec<_> = shop.library.tools.iter().collect();
+    tools.retain(|tool| {
+        let radius = tool.shape.radius_mm();
+        radius < smallest && radius >= 2.0 * step_mm
+    });
+    tools.sort_by(|a, b| b.shape.radius_mm().total_cmp(&a.shape.radius_mm()).then(a.name.cmp(&b.name)));
+    tools.truncate(CANDIDATES);
+    let profiles = tools
+        .iter()
+        .map(|tool| Profile::new(tool.shape, step_mm, 0.0))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok((tools.iter().map(|tool| tool.name.clone()).collect(), profiles))
+}
+
+impl TileResult {
+    /// The figures of a post, by default the first.
+    pub fn tally(&self, post: usize) -> &Tally {
+        &self.verdict.tallies[post]
+    }
+
+    /// A place of the tile's frame in the part's.
+    pub fn in_part(&self, place_mm: [f64; 2]) -> [f64; 2] {
+        [self.tile.setup.tile.x_mm + place_mm[0], self.tile.setup.tile.y_mm + place_mm[1]]
+    }
+
+    /// The folder that a program is moved to when it must not be run.
+    pub fn rejected(file: &Path) -> PathBuf {
+        let name: PathBuf = file.components().skip(1).collect();
+        Path::new("rejected").join(name)
+    }
+}

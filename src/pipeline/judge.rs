@@ -1,0 +1,320 @@
+//! One tile's cut, block by block: the design, the closing by every cutter, the exact passes and the surface that the
+//! read-back programs leave, all at full resolution and none of it held beyond a row of blocks.
+
+use rayon::prelude::*;
+
+use super::Error;
+use super::light::Sight;
+use crate::compensation::{self, Profile, RowPass, RowTarget};
+use crate::fidelity::light::LightTally;
+use crate::fidelity::cavities::{self, Labelled};
+use crate::fidelity::{self, Cavities, Found, Layers, Tally};
+use crate::grid::{Heights, Window};
+use crate::progress::Progress;
+use crate::surface::Surface;
+use crate::toolpath::{Axis, Layout};
+use crate::verify::{self, Blank, Judged, ProgramCut};
+
+const BLOCK_COLUMNS: usize = 2048;
+const BLOCK_ROWS: usize = 1024;
+
+/// The passes of a finishing operation that leaves no stock.
+pub struct ExactPasses {
+    pub layout: Layout,
+    pub profile: Profile,
+}
+
+/// What is judged.
+pub struct Case<'a> {
+    pub surface: &'a dyn Surface,
+    /// In the tile's frame.
+    pub blank: Blank,
+    /// The programs of each post in run order.
+    pub posts: &'a [Vec<Judged<'a>>],
+    /// Every cutter of the job once.
+    pub cutters: &'a [Profile],
+    /// Smaller cutters, largest first, that might reach what the job's cutters leave.
+    pub candidates: &'a [Profile],
+    pub passes: &'a [ExactPasses],
+    pub tally: fidelity::Params,
+    pub cavities: cavities::Params,
+    pub sight: Option<&'a Sight<'a>>,
+}
+
+/// What was found in one tile.
+pub struct Verdict {
+    /// One for each post.
+    pub tallies: Vec<Tally>,
+    /// For each post and program.
+    pub cuts: Vec<Vec<ProgramCut>>,
+    pub cavities: Found,
+    pub light_designed: LightTally,
+    /// For each post.
+    pub light_machined: Vec<LightTally>,
+}
+
+/// A row of blocks of the tile, lowest first, as the first post cuts it.
+pub struct Strip {
+    pub design: Heights,
+    pub machined: Heights,
+    pub cavity: Heights,
+}
+
+struct Block {
+    design: Heights,
+    machined: Heights,
+    cavity: Heights,
+    labelled: Labelled,
+    tallies: Vec<Tally>,
+    cuts: Vec<Vec<ProgramCut>>,
+    light_designed: LightTally,
+    light_machined: Vec<LightTally>,
+}
+
+/// Judges a tile; `each` receives its rows of blocks from the lowest y up.
+pub fn judge(
+    case: &Case,
+    progress: &dyn Progress,
+    each: &mut dyn FnMut(Strip) -> Result<(), Error>,
+) -> Result<Verdict, Error> {
+    let lattice = case.surface.lattice();
+    let mut tallies: Vec<Tally> = case.posts.iter().map(|_| Tally::new(case.tally)).collect();
+    let mut cuts: Vec<Vec<ProgramCut>> =
+        case.posts.iter().map(|programs| vec![ProgramCut::default(); programs.len()]).collect();
+    let mut light_designed = LightTally::default();
+    let mut light_machined: Vec<LightTally> = case.posts.iter().map(|_| LightTally::default()).collect();
+    let mut cavities = Cavities::new(case.cavities, lattice.window());
+    for row in (0..lattice.rows).step_by(BLOCK_ROWS) {
+        let rows = BLOCK_ROWS.min(lattice.rows - row);
+        let starts: Vec<usize> = (0..lattice.columns).step_by(BLOCK_COLUMNS).collect();
+        let blocks: Vec<Block> = starts
+            .par_iter()
+            .map(|&column| {
+                if progress.interrupted() {
+                    return Err(Error::Interrupted);
+                }
+                let columns = BLOCK_COLUMNS.min(lattice.columns - column);
+                let window = Window { column: column as i64, row: row as i64, columns, rows };
+                let block = case.block(window);
+                progress.advance((columns * rows) as u64);
+                block
+            })
+            .collect::<Result<_, Error>>()?;
+        let window = Window { column: 0, row: row as i64, columns: lattice.columns, rows };
+        let mut strip = Strip {
+            design: Heights::empty(window),
+            machined: Heights::empty(window),
+            cavity: Heights::empty(window),
+        };
+        for block in blocks {
+            paste(&mut strip.design, &block.design);
+            paste(&mut strip.machined, &block.machined);
+            paste(&mut strip.cavity, &block.cavity);
+            for (sum, tally) in tallies.iter_mut().zip(&block.tallies) {
+                sum.merge(tally);
+            }
+            for (sum, cut) in cuts.iter_mut().flatten().zip(block.cuts.iter().flatten()) {
+                sum.merge(cut);
+            }
+            light_designed.merge(&block.light_designed);
+            for (sum, light) in light_machined.iter_mut().zip(&block.light_machined) {
+                sum.merge(light);
+            }
+            cavities.add(block.labelled)?;
+        }
+        each(strip)?;
+    }
+    Ok(Verdict { tallies, cuts, cavities: cavities.finish(), light_designed, light_machined })
+}
+
+fn paste(strip: &mut Heights, block: &Heights) {
+    let columns = strip.window.columns;
+    for row in block.window.row..block.window.row_end() {
+        let start = (row - strip.window.row) as usize * columns + block.window.column as usize;
+        strip.z_mm[start..start + block.window.columns].copy_from_slice(block.row(row));
+    }
+}
+
+impl Case<'_> {
+    fn block(&self, window: Window) -> Result<Block, Error> {
+        let datum_mm = self.surface.top_mm();
+        let lattice = self.surface.lattice();
+        let profiles = self.cutters.iter().chain(self.candidates);
+        let reach = profiles.map(Profile::reach).max().unwrap_or(0);
+        let around = self.surface.heights(window.grown((2 * reach).max(1)), datum_mm)?;
+        let design = around.crop(window);
+        let cavity = self.cavity(&around, &design);
+        let passes = self.exact_passes(&around, window);
+        let residuals: Vec<Heights> = self
+            .candidates
+            .iter()
+            .map(|profile| compensation::residual(&compensation::closing(&around, profile, window), &design))
+            .collect();
+        let residuals: Vec<&Heights> = residuals.iter().collect();
+        let labelled = cavities::label(window, &cavity, &residuals, &self.cavities)?;
+        let mut block = Block {
+            machined: Heights::empty(window),
+            tallies: Vec::new(),
+            cuts: Vec::new(),
+            light_designed: LightTally::default(),
+            light_machined: Vec::new(),
+            design,
+            cavity,
+            labelled,
+        };
+        let near = around.crop(window.grown(1));
+        drop(around);
+        if let Some(sight) = self.sight {
+            sight.add(&mut block.light_designed, &near, window, lattice.step_mm);
+        }
+        for (post, programs) in self.posts.iter().enumerate() {
+            let stock = self.blank.heights(self.swept_window(window), lattice.step_mm, 0.0);
+            let swept = verify::sweep(stock, lattice.step_mm, 0.0, programs);
+            let machined = swept.heights.crop(window.grown(1));
+            let mut tally = Tally::new(self.tally);
+            let layers = Layers {
+                design: &near,
+                machined: &machined,
+                cavity: (!self.cutters.is_empty()).then_some(&block.cavity),
+                passes: passes.as_ref(),
+            };
+            tally.add(window, layers)?;
+            block.tallies.push(tally);
+            block.cuts.push(swept.programs);
+            let mut light = LightTally::default();
+            if let Some(sight) = self.sight {
+                let part = masked(&machined, &near);
+                sight.add(&mut light, &part, window, lattice.step_mm);
+            }
+            block.light_machined.push(light);
+            if post == 0 {
+                block.machined = masked(&machined.crop(window), &block.design);
+            }
+        }
+        Ok(block)
+    }
+
+    /// The block and one sample around it; at the tile's edges all of the blank's margin too, so that what is
+    /// cut there is seen.
+    fn swept_window(&self, window: Window) -> Window {
+        let lattice = self.surface.lattice();
+        let low = |edge: bool, first: i64, axis: usize| {
+            if edge { (self.blank.low_mm[axis] / lattice.step_mm).floor() as i64 } else { first - 1 }
+        };
+        let high = |edge: bool, end: i64, axis: usize| {
+            if edge { (self.blank.high_mm[axis] / lattice.step_mm).ceil() as i64 } else { end + 1 }
+        };
+        let column = low(window.column == 0, window.column, 0).min(window.column - 1);
+        let row = low(window.row == 0, window.row, 1).min(window.row - 1);
+        let column_end = high(window.column_end() == lattice.columns as i64, window.column_end(), 0);
+        let row_end = high(window.row_end() == lattice.rows as i64, window.row_end(), 1);
+        Window {
+            column,
+            row,
+            columns: (column_end.max(window.column_end() + 1) - column) as usize,
+            rows: (row_end.max(window.row_end() + 1) - row) as usize,
+        }
+    }
+
+    /// Minimum over the cutters of the closing, less the design.
+    fn cavity(&self, around: &Heights, design: &Heights) -> Heights {
+        let mut lowest: Option<Heights> = None;
+        for profile in self.cutters {
+            let closing = compensation::closing(around, profile, design.window);
+            match &mut lowest {
+                None => lowest = Some(closing),
+                Some(lowest) => lower(lowest, &closing),
+            }
+        }
+        match lowest {
+            Some(closing) => compensation::residual(&closing, design),
+            None => Heights::empty(design.window),
+        }
+    }
+
+    /// What the passes leave before any simplification and rounding; None where their positions are not
+    /// as dense as the samples.
+    fn exact_passes(&self, around: &Heights, window: Window) -> Option<Heights> {
+        let step_mm = self.surface.lattice().step_mm;
+        let mut lowest: Option<Heights> = None;
+        for passes in self.passes {
+            if (passes.layout.pitch_mm() - step_mm).abs() > 1e-9 * step_mm {
+                return None;
+            }
+            let left = match passes.layout.along {
+                Axis::X => passes.left(around, window),
+                Axis::Y => transposed(&passes.left(&transposed(around), swapped(window))),
+            };
+            match &mut lowest {
+                None => lowest = Some(left),
+                Some(lowest) => lower(lowest, &left),
+            }
+        }
+        lowest
+    }
+}
+
+impl ExactPasses {
+    fn left(&self, around: &Heights, window: Window) -> Heights {
+        let step_mm = self.profile.step_mm();
+        let reach_mm = (self.profile.reach() + 1) as f64 * step_mm;
+        let near = |low: i64, end: i64| (low as f64 * step_mm - reach_mm, end as f64 * step_mm + reach_mm);
+        let (x_low, x_high) = near(window.column, window.column_end());
+        let (y_low, y_high) = near(window.row, window.row_end());
+        let layout = &self.layout;
+        let index = |x_mm: f64| (x_mm - layout.start_mm()) / layout.pitch_mm();
+        let first = index(x_low).floor().max(0.0) as usize;
+        let end = (index(x_high).ceil().max(0.0) as usize + 1).min(layout.count);
+        if first >= end {
+            return Heights::empty(window);
+        }
+        let targets: Vec<RowTarget> = (0..layout.passes.len())
+            .map(|k| layout.across_mm(k))
+            .filter(|y_mm| (y_low..=y_high).contains(y_mm))
+            .map(|y_mm| RowTarget {
+                x0_mm: f64::from(layout.start + first as i32 * layout.pitch) * layout.unit_mm,
+                y_mm,
+                count: end - first,
+            })
+            .collect();
+        let rows = compensation::rows(around, &self.profile, &targets);
+        let passes: Vec<RowPass> = targets
+            .iter()
+            .zip(&rows)
+            .map(|(target, z_mm)| RowPass { x0_mm: target.x0_mm, y_mm: target.y_mm, z_mm })
+            .collect();
+        compensation::machined_by_rows(&passes, &self.profile, window)
+    }
+}
+
+fn lower(lowest: &mut Heights, other: &Heights) {
+    for (z, other) in lowest.z_mm.iter_mut().zip(&other.z_mm) {
+        *z = z.min(*other);
+    }
+}
+
+/// The machined surface where there is a design.
+fn masked(machined: &Heights, design: &Heights) -> Heights {
+    let mut masked = machined.clone();
+    for (z, design) in masked.z_mm.iter_mut().zip(&design.z_mm) {
+        if design.is_nan() {
+            *z = f32::NAN;
+        }
+    }
+    masked
+}
+
+fn swapped(window: Window) -> Window {
+    Window { column: window.row, row: window.column, columns: window.rows, rows: window.columns }
+}
+
+fn transposed(heights: &Heights) -> Heights {
+    let window = swapped(heights.window);
+    let mut out = Heights::empty(window);
+    for row in 0..window.rows {
+        for column in 0..window.columns {
+            out.z_mm[row * window.columns + column] = heights.z_mm[column * window.rows + row];
+        }
+    }
+    out
+}

@@ -1,0 +1,69 @@
+//! The room of a designed screen, as the judge of one tile needs it.
+
+use glam::DVec3;
+
+use crate::fidelity::light::{LightTally, Pose, Room, View};
+use crate::grid::{Heights, Lattice, Window};
+use crate::report::Light;
+use crate::screen::Scene;
+
+/// Points across a tile from which the audience is looked at.
+const POINTS: usize = 4;
+
+/// A tile in its place in front of the audience.
+pub struct Sight<'a> {
+    pub scene: &'a Scene,
+    pub pose: Pose,
+    /// Steepest face of the tile.
+    pub steepest: f64,
+}
+
+impl Sight<'_> {
+    /// Adds the light of a block of heights of the tile's frame.
+    pub fn add(&self, tally: &mut LightTally, heights: &Heights, window: Window, step_mm: f64) {
+        let index = self.scene.reflector.index;
+        let room = Room {
+            projector_m: self.scene.projector_m,
+            audience: &|point, out| self.scene.audience_hit(point, out),
+            reflectance: &|cosine| index.reflectance(cosine),
+            steepest: self.steepest,
+        };
+        tally.add(heights, window, step_mm, &self.pose, &room);
+    }
+}
+
+/// Points of a tile from which the audience is looked at, in metres of the screen's frame.
+pub fn points(pose: &Pose, lattice: &Lattice) -> Vec<DVec3> {
+    let place = |i: usize, length_mm: f64| (i as f64 + 0.5) / POINTS as f64 * length_mm;
+    (0..POINTS * POINTS)
+        .map(|k| {
+            let x_mm = place(k % POINTS, lattice.width_mm);
+            let y_mm = place(k / POINTS, lattice.height_mm);
+            pose.point_m(DVec3::new(x_mm, y_mm, 0.0))
+        })
+        .collect()
+}
+
+/// The mean view of the audience from these points.
+pub fn view(scene: &Scene, points_m: &[DVec3]) -> View {
+    View::from_points(points_m, &|point, out| scene.audience_hit(point, out))
+}
+
+/// The figures of `report.json` for a design and its cut.
+pub fn summary(designed: &LightTally, machined: &LightTally, view: &View) -> Option<Light> {
+    let (before, after) = (designed.shares()?, machined.shares()?);
+    Some(Light {
+        on_audience_designed: before.on_audience,
+        on_audience_machined: after.on_audience,
+        leak_designed: before.leak,
+        leak_machined: after.leak,
+        absorbed_designed: before.absorbed,
+        absorbed_machined: after.absorbed,
+        unresolved_designed: before.unresolved,
+        unresolved_machined: after.unresolved,
+        gain_designed: designed.gain(view),
+        gain_machined: machined.gain(view),
+        uniformity_designed: designed.uniformity(view),
+        uniformity_machined: machined.uniformity(view),
+    })
+}

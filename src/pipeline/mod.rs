@@ -1,0 +1,22 @@
+//! The whole flow, from a job to a judged set of programs.
+//!
+//! ```text
+//! job -> shop (machine, tools) -> part -> tiles -> for each tile and post: plan, write, read back
+//!                                              -> for each tile: judge block by block, maps, cavities
+//!                                              -> report
+//! ```
+//!
+//! Everything is written under a staging folder that the caller renames when all of it stands.
+
+mod cut;
+mod error;
+mod judge;
+mod light;
+mod maps;
+mod part;
+mod plan;
+mod report;
+mod shop;
+
+pub use cut::{Milled, mill};
+pub use error::Error;

@@ -1,0 +1,244 @@
+//! What a job cuts, and the piece of it that each tile is.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use super::Error;
+use crate::fidelity::light::Pose;
+use crate::job::{Blanks, Edge, Form, Job, Level, Unit, Up};
+use crate::machine::{Quantum, Tile};
+use crate::progress::Progress;
+use crate::screen::{self, CellRange, Design, Scene};
+use crate::surface::{self, Designed, Die, Surface, Walled};
+
+/// The part as it was given, before tiles, dies and levelling.
+pub struct Part {
+    /// The cells, if it is a designed screen.
+    pub design: Option<Arc<Design>>,
+    pub scene: Option<Scene>,
+    /// The whole part as it is cut: turned level if it is a mesh, turned into its die.
+    pub whole: Arc<dyn Surface>,
+    pub notes: Vec<String>,
+    /// Wedge angles of a levelled mesh; tiles of a design are levelled one by one.
+    wedge_deg: [f64; 2],
+    undercuts: Option<Undercuts>,
+}
+
+/// Faces that lean over after levelling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Undercuts {
+    pub faces: usize,
+    pub area_mm2: f64,
+}
+
+/// The surface of one tile in its own frame, and how it lies in the part.
+pub struct TileSurface {
+    pub surface: Arc<dyn Surface>,
+    /// Wedge angles about X and Y that mount it.
+    pub wedge_deg: [f64; 2],
+    pub undercuts: Option<Undercuts>,
+    /// A point p of the tile's frame (z = 0 at its highest design point) in the part's frame is
+    /// rotation . p + origin.
+    pub rotation: DMat3,
+    pub origin_mm: DVec3,
+}
+
+impl Part {
+    /// Loads or designs what the job names.
+    pub fn load(job: &Job, progress: &dyn Progress) -> Result<Part, Error> {
+        let mut part = match &job.part {
+            spec if spec.screen.is_some() || spec.design.is_some() => Part::designed(job, progress)?,
+            spec => {
+                let path = spec.mesh.as_deref().or(spec.heights.as_deref()).unwrap_or(Path::new(""));
+                let options = surface::Options {
+                    step_mm: spec.step_mm,
+                    pixel_mm: spec.pixel_mm,
+                    unit: match spec.unit {
+                        None | Some(Unit::Mm) => surface::Unit::Mm,
+                        Some(Unit::M) => surface::Unit::Metre,
+                        Some(Unit::Inch) => surface::Unit::Inch,
+                    },
+                    up: match spec.up {
+                        Some(Up::X) => surface::Up::X,
+                        Some(Up::Y) => surface::Up::Y,
+                        None | Some(Up::Z) => surface::Up::Z,
+                    },
+                    z_min_mm: spec.z_min_mm,
+                    z_max_mm: spec.z_max_mm,
+                };
+                let opened = surface::open(path, &options)?;
+                let mut part = Part {
+                    design: None,
+                    scene: None,
+                    whole: Arc::from(opened.surface),
+                    notes: opened.notes,
+                    wedge_deg: [0.0; 2],
+                    undercuts: None,
+                };
+                if spec.level == Level::Plane {
+                    let level = part.whole.levelled()?;
+                    part.wedge_deg = [level.about_x_deg, level.about_y_deg];
+                    part.undercuts = undercuts(&level);
+                    part.whole = Arc::new(level.surface);
+                }
+                part
+            }
+        };
+        if job.part.form == Form::Die {
+            part.whole = Arc::new(Die::new(part.whole));
+        }
+        Ok(part)
+    }
+
+    fn designed(job: &Job, progress: &dyn Progress) -> Result<Part, Error> {
+        let spec = &job.part;
+        let cells = spec.cells.map(|[c0, r0, c1, r1]| CellRange { c0, r0, c1, r1 });
+        let (design, scene) = match (&spec.screen, &spec.design) {
+            (Some(path), _) => {
+                let scene = Scene::read(path)?;
+                let elevation = match &spec.elevation {
+                    Some(path) => Some(screen::Elevation::read(path)?),
+                    None => None,
+                };
+                progress.begin("design", 1);
+                let design = screen::design(&scene, cells, elevation.as_ref(), &|_, _| {})?;
+                (design, Some(scene))
+            }
+            (None, path) => {
+                let mut design = Design::read(path.as_deref().unwrap_or(Path::new("")))?;
+                if let Some(cells) = cells {
+                    let core = design.core;
+                    let inside = cells.c0 >= core.c0 && cells.c1 <= core.c1;
+                    if !(inside && cells.r0 >= core.r0 && cells.r1 <= core.r1) {
+                        return Err(Error::CellsOutside { cells, core });
+                    }
+                    design.core = cells;
+                }
+                (design, None)
+            }
+        };
+        let design = Arc::new(design);
+        let whole = Designed::whole(Arc::clone(&design), spec.step_mm)?;
+        Ok(Part {
+            design: Some(design),
+            scene,
+            whole: Arc::new(whole),
+            notes: Vec::new(),
+            wedge_deg: [0.0; 2],
+            undercuts: None,
+        })
+    }
+
+    /// What the part may be cut between.
+    pub fn quantum(&self) -> Quantum {
+        match &self.design {
+            Some(design) => Quantum::Cell { cell_mm: design.cell_mm },
+            None => Quantum::Sample { step_mm: self.whole.lattice().step_mm },
+        }
+    }
+
+    /// Width and height in mm.
+    pub fn size_mm(&self) -> [f64; 2] {
+        let lattice = self.whole.lattice();
+        [lattice.width_mm, lattice.height_mm]
+    }
+
+    /// The surface of one tile.
+    pub fn tile(&self, job: &Job, tile: &Tile) -> Result<TileSurface, Error> {
+        let step_mm = job.part.step_mm;
+        let one_sheet = job.stock.blanks == Blanks::One;
+        let part_top_mm = self.whole.top_mm();
+        let mut wedge_deg = self.wedge_deg;
+        let mut undercut = self.undercuts;
+        let mut rotation = DMat3::IDENTITY;
+        let mut shift_mm = DVec3::ZERO;
+        let surface: Arc<dyn Surface> = match &self.design {
+            Some(design) if !(one_sheet && job.part.edge == Edge::Wall) => {
+                let cell_mm = design.cell_mm;
+                let count = |length_mm: f64| (length_mm / cell_mm).round() as i32;
+                let die = job.part.form == Form::Die;
+                // A die is the part seen from behind: its left tile is the part's right one.
+                let x_mm = if die { self.size_mm()[0] - tile.x_mm - tile.width_mm } else { tile.x_mm };
+                let (c0, r0) = (design.core.c0 + count(x_mm), design.core.r0 + count(tile.y_mm));
+                let own =
+                    CellRange { c0, r0, c1: c0 + count(tile.width_mm), r1: r0 + count(tile.height_mm) };
+                let material = if one_sheet { design.core } else { own };
+                let size_mm = [tile.width_mm, tile.height_mm];
+                let piece =
+                    Designed::new(Arc::clone(design), material, [x_mm, tile.y_mm], size_mm, step_mm)?;
+                let piece: Arc<dyn Surface> = if job.part.level == Level::Plane {
+                    let level = piece.levelled()?;
+                    wedge_deg = [level.about_x_deg, level.about_y_deg];
+                    undercut = undercuts(&level);
+                    // Columns of the transpose are the rows of the rotation.
+                    let back = level.rotation.map(DVec3::from_array);
+                    rotation = DMat3::from_cols(back[0], back[1], back[2]);
+                    shift_mm = DVec3::from_array(level.shift_mm);
+                    Arc::new(level.surface)
+                } else {
+                    Arc::new(piece)
+                };
+                if die { Arc::new(Die::new(piece)) } else { piece }
+            }
+            _ => self.piece_of_samples(job, tile)?,
+        };
+        let top_mm = surface.top_mm();
+        // Source z of the tile's frame: the tile's own top is its zero.
+        let corner = rotation * (DVec3::new(0.0, 0.0, top_mm) - shift_mm);
+        let origin_mm = corner + DVec3::new(tile.x_mm, tile.y_mm, -part_top_mm);
+        let surface = match job.part.edge {
+            Edge::Wall if !one_sheet => {
+                let wall_mm = top_mm + job.stock.top_allowance_mm;
+                Arc::new(Walled::new(surface, wall_mm)) as Arc<dyn Surface>
+            }
+            _ => surface,
+        };
+        Ok(TileSurface { surface, wedge_deg, undercuts: undercut, rotation, origin_mm })
+    }
+
+    /// A tile on whole samples of the part, with its neighbours if it is one sheet.
+    fn piece_of_samples(&self, job: &Job, tile: &Tile) -> Result<Arc<dyn Surface>, Error> {
+        let lattice = self.whole.lattice();
+        let step_mm = lattice.step_mm;
+        let start = |mm: f64| (mm / step_mm).round() as i64;
+        let window = crate::grid::Window {
+            column: start(tile.x_mm),
+            row: start(tile.y_mm),
+            columns: (start(tile.x_mm + tile.width_mm) - start(tile.x_mm)).max(1) as usize,
+            rows: (start(tile.y_mm + tile.height_mm) - start(tile.y_mm)).max(1) as usize,
+        };
+        let one_sheet = job.stock.blanks == Blanks::One;
+        let mut whole = Arc::clone(&self.whole);
+        if one_sheet && job.part.edge == Edge::Wall {
+            let wall_mm = whole.top_mm() + job.stock.top_allowance_mm;
+            whole = Arc::new(Walled::new(whole, wall_mm));
+        }
+        if window == lattice.window() {
+            return Ok(whole);
+        }
+        let piece = surface::Tile::new(whole, window, one_sheet)?;
+        let piece = piece.ok_or_else(|| Error::EmptyTile { tile: tile.name.clone() })?;
+        Ok(Arc::new(piece))
+    }
+
+    /// Where a tile stands in front of its audience; None for what is no screen, and for dies, which reflect nothing.
+    pub fn pose(&self, job: &Job, tile: &TileSurface) -> Option<Pose> {
+        let (scene, design) = (self.scene.as_ref()?, self.design.as_ref()?);
+        if job.part.form == Form::Die {
+            return None;
+        }
+        let corner_m = DVec3::new(
+            f64::from(design.core.c0) * design.cell_mm * 1e-3 - 0.5 * scene.width_m,
+            f64::from(design.core.r0) * design.cell_mm * 1e-3 - 0.5 * scene.height_m,
+            self.whole.top_mm() * 1e-3,
+        );
+        Some(Pose { origin_m: corner_m + tile.origin_mm * 1e-3, rotation: tile.rotation })
+    }
+}
+
+fn undercuts(level: &surface::Level) -> Option<Undercuts> {
+    (level.undercuts > 0)
+        .then_some(Undercuts { faces: level.undercuts, area_mm2: level.undercut_area_mm2 })
+}

@@ -1,0 +1,377 @@
+//! From judged tiles to the report: figures, findings, verdict, and the programs that must not be run set aside.
+
+use std::path::Path;
+
+use super::cut::{Milled, TileResult};
+use super::part::Part;
+use super::plan::{self, Program};
+use super::shop::Shop;
+use super::{Error, light};
+use crate::fidelity::light::LightTally;
+use crate::fidelity::{Figures, Tally};
+use crate::job::{Form, Job};
+use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
+use crate::report::cavity_list::{self, TileCavities};
+use crate::tolerance::Budget;
+use crate::verify::ProgramCut;
+
+/// Part of the area that has to lie within `limits.deviation_mm`.
+const WITHIN: f64 = 0.99;
+
+/// Writes everything but the programs and maps, which are there already, and gives the verdict.
+pub fn finish(
+    job: &Job,
+    shop: &Shop,
+    part: &Part,
+    mut results: Vec<TileResult>,
+    staging: &Path,
+) -> Result<Milled, Error> {
+    let lattice = part.whole.lattice();
+    let top_mm = part.whole.top_mm();
+    let mut report = Report::new(report::Part {
+        width_mm: lattice.width_mm,
+        height_mm: lattice.height_mm,
+        columns: lattice.columns,
+        rows: lattice.rows,
+        step_mm: lattice.step_mm,
+        z_min_mm: part.whole.bottom_mm() - top_mm,
+    });
+    for found in of_shop(job, shop, part) {
+        report.finding(found);
+    }
+    for result in &mut results {
+        for found in of_tile(job, shop, result, staging)? {
+            report.finding(found);
+        }
+        report.tiles.push(tile(job, shop, result));
+    }
+    let mut whole = Tally::new(crate::fidelity::Params {
+        step_mm: lattice.step_mm,
+        limit_mm: Some(job.limits.deviation_or_default_mm()),
+    });
+    let mut budget: Option<Budget> = None;
+    let mut cavities = 0;
+    for result in &results {
+        whole.merge(result.tally(0));
+        budget.get_or_insert(result.posts[0].budget);
+        cavities += result.verdict.cavities.count;
+    }
+    let figures = whole.figures();
+    report.fidelity = budget.map(|budget| Fidelity::of(&figures, shares(&budget), Some(cavities)));
+    report.light = of_light(part, job, &results);
+    times(job, shop, &results, &mut report);
+    for found in of_limits(job, &report, &figures) {
+        report.finding(found);
+    }
+    let candidates = results.iter().map(|result| TileCavities {
+        tile: &result.tile.setup.tile.name,
+        found: &result.verdict.cavities,
+        candidates: &result.candidates,
+    });
+    let cavities: Vec<TileCavities> = candidates.collect();
+    cavity_list::write_csv(&staging.join("cavities.csv"), &cavities)?;
+    cavity_list::write_geojson(&staging.join("cavities.geojson"), &cavities)?;
+    report::write_json(&staging.join("report.json"), &report)?;
+    let simulate = results.iter().map(|result| simulate(shop, result)).collect();
+    Ok(Milled { report, simulate })
+}
+
+fn shares(budget: &Budget) -> GougeBudget {
+    GougeBudget {
+        raster: budget.raster_mm,
+        simplify: budget.simplify_mm,
+        rounding: budget.rounding_mm,
+        controller: budget.controller_mm,
+    }
+}
+
+/// What is to be said before any tile.
+fn of_shop(job: &Job, shop: &Shop, part: &Part) -> Vec<Finding> {
+    let mut found: Vec<Finding> =
+        part.notes.iter().map(|note| finding(Severity::Warning, "input", note.clone())).collect();
+    let machine = &shop.machine;
+    for dialect in &shop.dialects {
+        if !machine.reads(&dialect.name) {
+            let message = format!(
+                "{} programs are written, and {} does not read them; it reads {}",
+                dialect.name,
+                machine.title,
+                machine.dialects.join(", ")
+            );
+            found.push(finding(Severity::Warning, "dialect", message));
+        }
+    }
+    let unconfirmed = machine.unconfirmed();
+    if !unconfirmed.is_empty() {
+        let message = format!(
+            "no source confirms {} of the profile {}; verify against your machine",
+            unconfirmed.join(", "),
+            machine.name
+        );
+        found.push(finding(Severity::Warning, "unconfirmed", message));
+    }
+    if job.part.form == Form::Die {
+        let message = "a die reflects nothing: no light is reported; step walls between cells do not release \
+                       from a pressed sheet unless seam = \"stitched\"";
+        found.push(finding(Severity::Warning, "die", message));
+    }
+    found
+}
+
+/// What a tile shows, with the programs that must not be run moved to `rejected/`.
+fn of_tile(
+    job: &Job,
+    shop: &Shop,
+    result: &mut TileResult,
+    staging: &Path,
+) -> Result<Vec<Finding>, Error> {
+    let name = result.tile.setup.tile.name.clone();
+    let gouge_limit_mm = job.limits.gouge_or_default_mm();
+    let mut found = Vec::new();
+    if let Some(undercuts) = result.tile.piece.undercuts {
+        let message = format!(
+            "levelling turned {} faces ({:.3} mm2) so far that a vertical cutter cannot reach under them",
+            undercuts.faces, undercuts.area_mm2
+        );
+        found.push(finding(Severity::Warning, "undercut", message).on(&name));
+    }
+    for post in 0..result.posts.len() {
+        let mut bad = Vec::new();
+        let figures = result.tally(post).figures();
+        if figures.gouge_max_mm > gouge_limit_mm {
+            let message = format!(
+                "{}: the read-back programs cut {:.4} mm below the design, {gouge_limit_mm} mm are allowed",
+                result.posts[post].dialect, figures.gouge_max_mm
+            );
+            let place = figures.gouge_where_mm.unwrap_or_default();
+            bad.push(finding(Severity::Error, "gouge", message).on(&name).at(&result.in_part(place)));
+        }
+        if figures.samples == 0 {
+            let message = format!("{}: nothing was judged", result.posts[post].dialect);
+            bad.push(finding(Severity::Error, "unjudged", message).on(&name));
+        }
+        for (index, program) in result.posts[post].programs.iter().enumerate() {
+            let cut = &result.verdict.cuts[post][index];
+            bad.extend(of_motions(job, shop, result, post, index));
+            found.extend(of_wear(shop, program, cut).into_iter().map(|f| f.on(&name)));
+        }
+        if !bad.is_empty() {
+            for program in &mut result.posts[post].programs {
+                let away = TileResult::rejected(&program.file);
+                let (from, to) = (staging.join(&program.file), staging.join(&away));
+                let output = |source| Error::Output { path: to.clone(), source };
+                if let Some(folder) = to.parent() {
+                    std::fs::create_dir_all(folder).map_err(output)?;
+                }
+                std::fs::rename(&from, &to).map_err(output)?;
+                program.file = away;
+            }
+        }
+        found.extend(bad);
+    }
+    Ok(found)
+}
+
+/// Errors of one program's motions.
+fn of_motions(job: &Job, shop: &Shop, result: &TileResult, post: usize, index: usize) -> Vec<Finding> {
+    let tile = &result.tile;
+    let name = &tile.setup.tile.name;
+    let program = &result.posts[post].programs[index];
+    let cut = &result.verdict.cuts[post][index];
+    let file = program.file.display();
+    let mut found = Vec::new();
+    let tool = &shop.tools[program.operation];
+    let bounds = plan::bounds_over_stock(&program.extent, tile);
+    let radius_mm = tool
+        .cylinders(shop.machine.spindle.nose_diameter_mm)
+        .iter()
+        .fold(tool.shape.radius_mm(), |widest, cylinder| widest.max(cylinder.radius_mm));
+    if let Err(refusal) = tile.setup.check(&bounds, radius_mm, job.machine.clearance_mm, &shop.machine) {
+        found.push(finding(Severity::Error, "travel", format!("{file}: {refusal}")).on(name));
+    }
+    if let Some(bite) = cut.rapid {
+        let message = format!("{file}:{}: a rapid goes {:.4} mm deep through the stock", bite.line, bite.depth_mm);
+        let place = result.in_part([bite.at_mm[0], bite.at_mm[1]]);
+        found.push(finding(Severity::Error, "rapid-through-stock", message).on(name).at(&place));
+    }
+    if let Some(rapid) = &result.lateral_rapids[post][index] {
+        let message = format!(
+            "{file}:{}: a rapid in X or Y runs {:.4} mm below the stock's top",
+            rapid.line, rapid.below_mm
+        );
+        found.push(finding(Severity::Error, "lateral-rapid", message).on(name));
+    }
+    if !cut.touched() {
+        let message = format!("{file}: cuts nothing; hint: leave the operation out");
+        found.push(finding(Severity::Warning, "air", message).on(name));
+    }
+    found
+}
+
+/// What a program asks of its cutter, and what its reader noticed.
+fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Finding> {
+    let tool = &shop.tools[program.operation];
+    let file = program.file.display();
+    let mut found = Vec::new();
+    let bite_mm = cut.deepest_bite_mm();
+    if let Some(most_mm) = tool.max_depth_mm
+        && bite_mm > most_mm
+    {
+        let message = format!(
+            "{file}: {} bites {bite_mm:.3} mm deep at once, its max_depth_mm is {most_mm}; hint: a smaller stepdown, or a semi-finish before it",
+            tool.name
+        );
+        found.push(finding(Severity::Warning, "bite", message));
+    }
+    let length_m = program.extent.cutting_mm * 1e-3;
+    if let Some(life_m) = tool.tool_life_m
+        && length_m > life_m
+    {
+        let cutters = (length_m / life_m).ceil();
+        let message = format!(
+            "{file}: {length_m:.0} m of cut, {} lasts {life_m} m; hint: {cutters} cutters, changed at a pass end",
+            tool.name
+        );
+        found.push(finding(Severity::Warning, "tool-life", message));
+    }
+    for note in &program.reading.summary.notes {
+        found.push(finding(Severity::Note, "program", format!("{file}: {note}")));
+    }
+    found
+}
+
+fn tile(job: &Job, shop: &Shop, result: &TileResult) -> report::Tile {
+    let at = &result.tile.setup.tile;
+    let mut programs = Vec::new();
+    for (post, cuts) in result.posts.iter().zip(&result.verdict.cuts) {
+        for (program, cut) in post.programs.iter().zip(cuts) {
+            let tool = &shop.tools[program.operation];
+            let (low, high) = (program.extent.low_mm, program.extent.high_mm);
+            programs.push(report::Program {
+                file: program.file.display().to_string(),
+                post: post.dialect.clone(),
+                operation: job.operations[program.operation].kind.word().into(),
+                tool: tool.name.clone(),
+                cutter: tool.shape.to_string(),
+                blocks: program.reading.summary.blocks,
+                bytes: program.reading.summary.bytes,
+                cutting_mm: program.extent.cutting_mm,
+                rapid_mm: program.extent.rapid_mm,
+                time_s: program.timing.total_s,
+                deepest_bite_mm: cut.deepest_bite_mm(),
+                bounds_mm: Bounds {
+                    x: [low[0], high[0]],
+                    y: [low[1], high[1]],
+                    z: [low[2], high[2]],
+                },
+            });
+        }
+    }
+    let surface = result.tile.surface();
+    let figures = result.tally(0).figures();
+    let shares = shares(&result.posts[0].budget);
+    report::Tile {
+        name: at.name.clone(),
+        row: at.row,
+        column: at.column,
+        x_mm: at.x_mm,
+        y_mm: at.y_mm,
+        width_mm: at.width_mm,
+        height_mm: at.height_mm,
+        z_range_mm: surface.top_mm() - surface.bottom_mm(),
+        program_zero_mm: result.tile.program_zero_mm(),
+        wedge_deg: result.tile.piece.wedge_deg,
+        programs,
+        maps: Some(result.maps.clone()),
+        fidelity: Some(Fidelity::of(&figures, shares, Some(result.verdict.cavities.count))),
+    }
+}
+
+/// The light of all tiles together, before and after.
+fn of_light(part: &Part, job: &Job, results: &[TileResult]) -> Option<report::Light> {
+    let scene = part.scene.as_ref()?;
+    let (mut designed, mut machined) = (LightTally::default(), LightTally::default());
+    let mut points = Vec::new();
+    for result in results {
+        designed.merge(&result.verdict.light_designed);
+        machined.merge(result.verdict.light_machined.first()?);
+        let pose = part.pose(job, &result.tile.piece)?;
+        points.extend(light::points(&pose, &result.tile.surface().lattice()));
+    }
+    light::summary(&designed, &machined, &light::view(scene, &points))
+}
+
+/// Machine time of the first post's programs; the other posts are the same work in other words.
+fn times(job: &Job, shop: &Shop, results: &[TileResult], report: &mut Report) {
+    for program in results.iter().flat_map(|result| &result.posts[0].programs) {
+        let tool = &shop.tools[program.operation];
+        let kind = job.operations[program.operation].kind.word();
+        let time_s = program.timing.total_s;
+        report.time_s.total += time_s;
+        report.time_s.by_operation.add(&format!("{:02}-{kind}-{}", program.operation + 1, tool.name), time_s);
+        report.time_s.by_tool.add(&tool.name, time_s);
+    }
+}
+
+/// The limits that the job names and the cut does not keep.
+fn of_limits(job: &Job, report: &Report, figures: &Figures) -> Vec<Finding> {
+    let limits = &job.limits;
+    let mut found = Vec::new();
+    let mut miss = |code: &str, message: String| found.push(finding(Severity::Error, code, message));
+    if let (Some(limit_mm), Some(within)) = (limits.deviation_mm, figures.within_limit_fraction)
+        && within < WITHIN
+    {
+        let message = format!(
+            "{:.2} % of the area lie within {limit_mm} mm of the design, {:.0} % are asked for",
+            100.0 * within,
+            100.0 * WITHIN
+        );
+        miss("deviation", message);
+    }
+    if let (Some(limit_deg), Some(normal_deg)) = (limits.normal_p95_deg, figures.normal_p95_deg)
+        && normal_deg > limit_deg
+    {
+        let message = format!("5 % of the normals are off by more than {normal_deg:.2} degrees, {limit_deg} are allowed");
+        miss("normals", message);
+    }
+    if let (Some(least), Some(light)) = (limits.on_audience_min, &report.light)
+        && light.on_audience_machined < least
+    {
+        let message = format!(
+            "{:.4} of the light reaches the audience (the design: {:.4}), {least} are asked for",
+            light.on_audience_machined, light.on_audience_designed
+        );
+        miss("on-audience", message);
+    }
+    let hours = report.time_s.total / 3600.0;
+    if let Some(most) = limits.hours_max
+        && hours > most
+    {
+        miss("hours", format!("{hours:.1} machine hours, {most} are allowed"));
+    }
+    found
+}
+
+/// The command that judges a tile's programs again from the files alone.
+fn simulate(shop: &Shop, result: &TileResult) -> String {
+    let post = &result.posts[0];
+    let files: Vec<String> = post.programs.iter().map(|p| format!("{{out}}/{}", p.file.display())).collect();
+    let cutters: Vec<String> =
+        post.programs.iter().map(|p| shop.tools[p.operation].shape.to_string()).collect();
+    let top_mm = result.tile.piece.origin_mm.z;
+    let tile = &result.tile;
+    let name = &tile.setup.tile.name;
+    let command = format!(
+        "screenmill simulate {} --cutter {} --part {{out}}/maps/{name}-design.tif --zero 0 0 {:.6} --stock-top-mm {:.6} --machine {} --out {{out}}/simulate-{name}",
+        files.join(" "),
+        cutters.join(","),
+        top_mm + tile.z_zero_mm,
+        top_mm + tile.allowance_mm,
+        shop.machine.name
+    );
+    if result.map_factor == 1 {
+        command
+    } else {
+        format!("{command}  (the maps are reduced by {}; set [maps] full = true first)", result.map_factor)
+    }
+}

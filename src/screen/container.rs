@@ -1,0 +1,359 @@
+//! The design container: an `.npz` that plain numpy reads.
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read, Seek, Write};
+use std::path::Path;
+
+use npyz::{DType, NpyFile, Order, TypeChar, WriterBuilder};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+
+use super::{Cell, CellRange, Design, Elevation, Facet, Profile, Seam};
+
+/// Most bytes that one array may hold.
+const MOST_BYTES: u64 = 1 << 34;
+
+/// An empty file in the folder of `path`, to be renamed to it when whole. Its mode is that of any new
+/// file.
+pub(super) fn beside(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.prefix(".screenmill-").tempfile_in(folder)
+}
+
+/// Why a container or an elevation file was not read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum ContainerError {
+    #[error("{path}: {source}")]
+    Io { path: String, source: std::io::Error },
+    #[error(
+        "{path} is no complete .npz archive: {source}; hint: it may be cut off, write it again with screenmill design"
+    )]
+    Archive { path: String, source: zip::result::ZipError },
+    #[error(
+        "{path} has no array \"{array}\"; hint: a design holds cell, core, cell_mm, elevation_mm, facet_start, gradient, offset_mm, area_mm2, profile and seam"
+    )]
+    Missing { path: String, array: &'static str },
+    #[error("{path}: array \"{array}\" cannot be read: {source}; hint: it may be cut off")]
+    Array { path: String, array: &'static str, source: std::io::Error },
+    #[error("{path}: array \"{array}\" holds {found}, {wanted} are wanted")]
+    Type { path: String, array: &'static str, found: String, wanted: &'static str },
+    #[error("{path}: array \"{array}\" has the shape {found:?}, {wanted} is wanted")]
+    Shape { path: String, array: &'static str, found: Vec<u64>, wanted: String },
+    #[error("{path}: array \"{array}\" says {claimed} bytes and has {held}; hint: it may be cut off")]
+    Size { path: String, array: &'static str, claimed: u128, held: u64 },
+    #[error("{path}: {array}[{index}] is {value}, {wanted} is wanted")]
+    Value { path: String, array: &'static str, index: usize, value: f64, wanted: String },
+    #[error("{path}: cell ({column}, {row}) stands twice in array \"cell\"")]
+    Twice { path: String, column: i32, row: i32 },
+    #[error(
+        "{path}: {found} cells do not fill their {columns} x {rows} rectangle; hint: the first that is missing is ({column}, {row})"
+    )]
+    Gap { path: String, found: usize, columns: u64, rows: u64, column: i64, row: i64 },
+    #[error(
+        "{path}: core {c0} {r0} {c1} {r1} reaches past the cells, which are {has_c0} {has_r0} {has_c1} {has_r1}"
+    )]
+    Core {
+        path: String,
+        c0: i32,
+        r0: i32,
+        c1: i32,
+        r1: i32,
+        has_c0: i32,
+        has_r0: i32,
+        has_c1: i64,
+        has_r1: i64,
+    },
+}
+
+impl Design {
+    /// Writes the container; the same design gives the same bytes. Nothing is left under `path` if
+    /// that fails.
+    pub fn write(&self, path: &Path) -> Result<(), ContainerError> {
+        let name = path.display().to_string();
+        let io = |source| ContainerError::Io { path: path.display().to_string(), source };
+        let file = beside(path).map_err(io)?;
+        let mut zip = ZipWriter::new(BufWriter::new(file));
+        self.write_arrays(&mut zip).map_err(io)?;
+        let buffer = zip.finish().map_err(|source| ContainerError::Archive { path: name, source })?;
+        let file = buffer.into_inner().map_err(|e| io(e.into_error()))?;
+        file.persist(path).map_err(|e| io(e.error))?;
+        Ok(())
+    }
+
+    fn write_arrays<W: Write + Seek>(&self, zip: &mut ZipWriter<W>) -> std::io::Result<()> {
+        let n = self.cells.len() as u64;
+        let facets = || self.cells.iter().flat_map(|cell| cell.facets.iter());
+        let m = facets().count() as u64;
+        let mut total = 0;
+        let starts = std::iter::once(0).chain(self.cells.iter().map(|cell| {
+            total += cell.facets.len() as i64;
+            total
+        }));
+        let CellRange { c0, r0, c1, r1 } = self.core;
+        array(zip, "cell", &[n, 2], self.cells.iter().flat_map(|cell| [cell.column, cell.row]))?;
+        array(zip, "core", &[4], [c0, r0, c1, r1])?;
+        array(zip, "cell_mm", &[], [self.cell_mm])?;
+        array(zip, "elevation_mm", &[n], self.cells.iter().map(|cell| cell.elevation_mm))?;
+        array(zip, "facet_start", &[n + 1], starts)?;
+        array(zip, "gradient", &[m, 2], facets().flat_map(|facet| facet.gradient))?;
+        array(zip, "offset_mm", &[m], facets().map(|facet| facet.offset_mm))?;
+        array(zip, "area_mm2", &[m], facets().map(|facet| facet.area_mm2))?;
+        array(zip, "profile", &[], [i32::from(self.profile == Profile::Dish)])?;
+        array(zip, "seam", &[], [i32::from(self.seam == Seam::Stitched)])
+    }
+
+    /// Reads a container and checks that its arrays fit together.
+    pub fn read(path: &Path) -> Result<Design, ContainerError> {
+        let file = File::open(path)
+            .map_err(|source| ContainerError::Io { path: path.display().to_string(), source })?;
+        Design::from_archive(BufReader::new(file), &path.display().to_string())
+    }
+
+    /// Reads a container from memory or a stream; `path` names it in errors.
+    pub fn from_archive<R: Read + Seek>(reader: R, path: &str) -> Result<Design, ContainerError> {
+        let archive = ZipArchive::new(reader)
+            .map_err(|source| ContainerError::Archive { path: path.into(), source })?;
+        let mut arrays = Arrays { archive, path };
+        let scalar = |value: Vec<f64>| value[0];
+        let cell = arrays.read("cell", &[None, Some(2)], Numbers::Whole)?;
+        let n = cell.len() / 2;
+        let core = arrays.read("core", &[Some(4)], Numbers::Whole)?;
+        let cell_mm = scalar(arrays.read("cell_mm", &[], Numbers::Real)?);
+        let elevation = arrays.read("elevation_mm", &[Some(n)], Numbers::Real)?;
+        let start = arrays.read("facet_start", &[Some(n + 1)], Numbers::Whole)?;
+        let gradient = arrays.read("gradient", &[None, Some(2)], Numbers::Real)?;
+        let m = gradient.len() / 2;
+        let offset = arrays.read("offset_mm", &[Some(m)], Numbers::Real)?;
+        let area = arrays.read("area_mm2", &[Some(m)], Numbers::Real)?;
+        let profile = scalar(arrays.read("profile", &[], Numbers::Whole)?);
+        let seam = scalar(arrays.read("seam", &[], Numbers::Whole)?);
+
+        let path = || path.to_string();
+        let refuse = |array, index, value, wanted: &str| {
+            Err(ContainerError::Value { path: path(), array, index, value, wanted: wanted.into() })
+        };
+        if n == 0 {
+            return Err(ContainerError::Shape {
+                path: path(),
+                array: "cell",
+                found: vec![0, 2],
+                wanted: "at least one cell".into(),
+            });
+        }
+        if !(cell_mm > 0.0) {
+            return refuse("cell_mm", 0, cell_mm, "a width above 0");
+        }
+        if profile != 0.0 && profile != 1.0 {
+            return refuse("profile", 0, profile, "0 (bump) or 1 (dish)");
+        }
+        if seam != 0.0 && seam != 1.0 {
+            return refuse("seam", 0, seam, "0 (step) or 1 (stitched)");
+        }
+        for (array, values) in [("cell", &cell), ("core", &core)] {
+            if let Some(index) = values.iter().position(|v| v.abs() > f64::from(1 << 30)) {
+                return refuse(array, index, values[index], "a column or row within 2^30");
+            }
+        }
+        if start[0] != 0.0 {
+            return refuse("facet_start", 0, start[0], "0");
+        }
+        for index in 1..=n {
+            if start[index] <= start[index - 1] {
+                return refuse("facet_start", index, start[index], "a larger number than the one before");
+            }
+        }
+        if start[n] != m as f64 {
+            return refuse("facet_start", n, start[n], &format!("the number of facets, {m},"));
+        }
+        let mut cells = Vec::with_capacity(n);
+        for k in 0..n {
+            let facets = (start[k] as usize..start[k + 1] as usize)
+                .map(|f| Facet {
+                    gradient: [gradient[2 * f], gradient[2 * f + 1]],
+                    offset_mm: offset[f],
+                    area_mm2: area[f],
+                })
+                .collect();
+            let (column, row) = (cell[2 * k] as i32, cell[2 * k + 1] as i32);
+            cells.push(Cell { column, row, elevation_mm: elevation[k], facets });
+        }
+        cells.sort_by_key(|cell| (cell.row, cell.column));
+        let core =
+            CellRange { c0: core[0] as i32, r0: core[1] as i32, c1: core[2] as i32, r1: core[3] as i32 };
+        let design = Design {
+            core,
+            cell_mm,
+            profile: if profile == 1.0 { Profile::Dish } else { Profile::Bump },
+            seam: if seam == 1.0 { Seam::Stitched } else { Seam::Step },
+            cells,
+        };
+        design.check_layout(path())?;
+        Ok(design)
+    }
+
+    /// The cells fill one rectangle that holds the core, so that any cell is found by counting.
+    fn check_layout(&self, path: String) -> Result<(), ContainerError> {
+        for pair in self.cells.windows(2) {
+            let (a, b) = (&pair[0], &pair[1]);
+            if (a.column, a.row) == (b.column, b.row) {
+                return Err(ContainerError::Twice { path, column: a.column, row: a.row });
+            }
+        }
+        let low = |of: fn(&Cell) -> i32| self.cells.iter().map(of).min().unwrap_or_default();
+        let high = |of: fn(&Cell) -> i32| self.cells.iter().map(of).max().unwrap_or_default();
+        let (left, bottom) = (low(|c| c.column), low(|c| c.row));
+        let columns = i64::from(high(|c| c.column)) - i64::from(left) + 1;
+        let rows = i64::from(high(|c| c.row)) - i64::from(bottom) + 1;
+        let place = |at: usize| {
+            let at = at as i64;
+            (i64::from(left) + at % columns, i64::from(bottom) + at / columns)
+        };
+        let odd = |&at: &usize| {
+            let here = self.cells.get(at).map(|c| (i64::from(c.column), i64::from(c.row)));
+            here != Some(place(at))
+        };
+        let found = self.cells.len();
+        if let Some(at) = (0..found).find(odd).or((found as i64 != columns * rows).then_some(found)) {
+            let (column, row) = place(at);
+            let (columns, rows) = (columns as u64, rows as u64);
+            return Err(ContainerError::Gap { path, found, columns, rows, column, row });
+        }
+        let CellRange { c0, r0, c1, r1 } = self.core;
+        let (has_c1, has_r1) = (i64::from(left) + columns, i64::from(bottom) + rows);
+        let inside = left <= c0 && c0 < c1 && i64::from(c1) <= has_c1;
+        if !inside || !(bottom <= r0 && r0 < r1 && i64::from(r1) <= has_r1) {
+            let (has_c0, has_r0) = (left, bottom);
+            return Err(ContainerError::Core { path, c0, r0, c1, r1, has_c0, has_r0, has_c1, has_r1 });
+        }
+        Ok(())
+    }
+}
+
+impl Elevation {
+    /// Reads an elevation of rows x columns in mm from a `.npy`, the lowest row first.
+    pub fn read(path: &Path) -> Result<Elevation, ContainerError> {
+        let name = path.display().to_string();
+        let io = |source| ContainerError::Io { path: path.display().to_string(), source };
+        let file = File::open(path).map_err(io)?;
+        let held = file.metadata().map_err(io)?.len();
+        let (z_mm, shape) =
+            numbers(BufReader::new(file), held, "elevation", &name, &[None, None], Numbers::Real)?;
+        Ok(Elevation { columns: shape[1] as usize, rows: shape[0] as usize, z_mm })
+    }
+}
+
+fn array<W, T, I>(zip: &mut ZipWriter<W>, name: &str, shape: &[u64], values: I) -> std::io::Result<()>
+where
+    W: Write + Seek,
+    T: npyz::AutoSerialize,
+    I: IntoIterator<Item = T>,
+{
+    // Stored, not deflated: facets are noise to a compressor, and numpy maps what is stored.
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .last_modified_time(DateTime::default());
+    zip.start_file(format!("{name}.npy"), options)?;
+    let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(zip).begin_nd()?;
+    writer.extend(values)?;
+    writer.finish()
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Numbers {
+    Whole,
+    Real,
+}
+
+struct Arrays<'a, R> {
+    archive: ZipArchive<R>,
+    path: &'a str,
+}
+
+impl<R: Read + Seek> Arrays<'_, R> {
+    /// Reads one array of the shape given, where None is any length.
+    fn read(
+        &mut self,
+        name: &'static str,
+        shape: &[Option<usize>],
+        kind: Numbers,
+    ) -> Result<Vec<f64>, ContainerError> {
+        let path = || self.path.to_string();
+        let entry = match self.archive.by_name(&format!("{name}.npy")) {
+            Ok(entry) => entry,
+            Err(zip::result::ZipError::FileNotFound) => {
+                return Err(ContainerError::Missing { path: path(), array: name });
+            }
+            Err(source) => return Err(ContainerError::Archive { path: path(), source }),
+        };
+        let held = entry.size();
+        Ok(numbers(entry, held, name, self.path, shape, kind)?.0)
+    }
+}
+
+/// Reads an array as numbers in row-major order, with its shape.
+fn numbers<R: Read>(
+    reader: R,
+    held: u64,
+    name: &'static str,
+    path: &str,
+    wanted: &[Option<usize>],
+    kind: Numbers,
+) -> Result<(Vec<f64>, Vec<u64>), ContainerError> {
+    let broken = |source| ContainerError::Array { path: path.into(), array: name, source };
+    let file = NpyFile::new(reader).map_err(broken)?;
+    let found = file.shape().to_vec();
+    let fits = found.len() == wanted.len()
+        && found.iter().zip(wanted).all(|(&have, want)| want.is_none_or(|want| have == want as u64));
+    if !fits {
+        let sides: Vec<String> = wanted.iter().map(|w| w.map_or("any".into(), |w| w.to_string())).collect();
+        let wanted = format!("[{}]", sides.join(", "));
+        return Err(ContainerError::Shape { path: path.into(), array: name, found, wanted });
+    }
+    let refuse = |found: String| ContainerError::Type {
+        path: path.into(),
+        array: name,
+        found,
+        wanted: if kind == Numbers::Whole { "whole numbers (int32 or int64)" } else { "float64 or float32" },
+    };
+    let DType::Plain(scalar) = file.dtype() else { return Err(refuse(file.dtype().descr())) };
+    let claimed = found
+        .iter()
+        .fold(1u128, |size, &side| size.saturating_mul(u128::from(side)))
+        .saturating_mul(u128::from(scalar.size_field()));
+    if claimed > u128::from(held.min(MOST_BYTES)) {
+        return Err(ContainerError::Size { path: path.into(), array: name, claimed, held });
+    }
+    let by_columns = file.order() == Order::Fortran;
+    let values: Vec<f64> = match (kind, scalar.type_char(), scalar.size_field()) {
+        (Numbers::Whole, TypeChar::Int, 4) => {
+            file.into_vec::<i32>().map_err(broken)?.into_iter().map(f64::from).collect()
+        }
+        // Exact: columns, rows and counts of facets stay far below 2^53.
+        (Numbers::Whole, TypeChar::Int, 8) => {
+            file.into_vec::<i64>().map_err(broken)?.into_iter().map(|v| v as f64).collect()
+        }
+        (Numbers::Real, TypeChar::Float, 4) => {
+            file.into_vec::<f32>().map_err(broken)?.into_iter().map(f64::from).collect()
+        }
+        (Numbers::Real, TypeChar::Float, 8) => file.into_vec::<f64>().map_err(broken)?,
+        _ => return Err(refuse(scalar.to_string())),
+    };
+    if let Some(index) = values.iter().position(|v| !v.is_finite()) {
+        return Err(ContainerError::Value {
+            path: path.into(),
+            array: name,
+            index,
+            value: values[index],
+            wanted: "a finite number".into(),
+        });
+    }
+    if by_columns && found.len() == 2 {
+        let (rows, columns) = (found[0] as usize, found[1] as usize);
+        let turned = (0..rows * columns).map(|at| values[at % columns * rows + at / columns]).collect();
+        return Ok((turned, found));
+    }
+    Ok((values, found))
+}

@@ -1,0 +1,235 @@
+//! Parallel passes over the cutter-location surface, each as few long moves.
+
+use rayon::prelude::*;
+
+use super::envelope::{Cutter, Envelope};
+use super::passes::{contact_radius_mm, tip_radius_mm};
+use super::pen::Pen;
+use super::strip::{Strip, band_length};
+use super::{Axis, Error, GridPoint, Layout, Progress, Site, Toolpath, funnel, link};
+use crate::cutter::Shape;
+use crate::tolerance::EXCESS_MM;
+
+/// How far apart passes lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spacing {
+    /// mm in the XY plane.
+    StepoverMm(f64),
+    /// Height in mm that is left between two passes on the steepest face.
+    ScallopMm(f64),
+}
+
+/// The order of passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pattern {
+    Zigzag,
+    /// Every pass the same way, climbing with a spindle that turns clockwise (M3): the uncut material is
+    /// on the right of the motion.
+    OneWay,
+}
+
+/// What a finishing operation asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Params {
+    pub shape: Shape,
+    pub spacing: Spacing,
+    /// 0: along X, 90: along Y.
+    pub direction_deg: f64,
+    pub pattern: Pattern,
+    /// Added to every height, in mm: above 0 it is a semi-finish.
+    pub stock_to_leave_mm: f64,
+    /// Retracts after this many passes of a zigzag, so that a program can start again there; 0: never.
+    pub restart_passes: usize,
+}
+
+/// The stepover in mm that leaves a scallop of this height between passes of a round tip on a face
+/// whose slope across the passes is `slope_across`: w = 2 sqrt(2 r h - h^2) in the face's plane, cos(beta)
+/// of it in the XY plane.
+pub fn stepover_mm(shape: &Shape, scallop_mm: f64, slope_across: f64) -> Result<f64, Error> {
+    let tip = tip_radius_mm(shape);
+    if tip <= 0.0 {
+        return Err(Error::ScallopTip { cutter: shape.to_string() });
+    }
+    if !(scallop_mm > 0.0 && scallop_mm < tip) {
+        return Err(Error::Scallop { scallop_mm, cutter: shape.to_string(), tip_radius_mm: tip });
+    }
+    Ok(2.0 * (2.0 * tip * scallop_mm - scallop_mm * scallop_mm).sqrt() / 1.0f64.hypot(slope_across))
+}
+
+/// Where the passes lie and where on them the cutter location is evaluated.
+pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
+    site.validate(0.0)?;
+    let along = Axis::from_deg(params.direction_deg)?;
+    if !(params.stock_to_leave_mm >= 0.0 && params.stock_to_leave_mm.is_finite()) {
+        return Err(Error::StockToLeave { leave_mm: params.stock_to_leave_mm });
+    }
+    let (slope_along, slope_across) = along.split(site.surface.steepest());
+    let diameter_mm = 2.0 * params.shape.radius_mm();
+    let (spacing_mm, hint) = match params.spacing {
+        Spacing::StepoverMm(stepover_mm) => (stepover_mm, "a stepover_mm of at least one unit"),
+        Spacing::ScallopMm(scallop_mm) => {
+            let wide = stepover_mm(&params.shape, scallop_mm, slope_across)?;
+            (
+                wide.min(diameter_mm),
+                "give stepover_mm, or a larger scallop_mm: the steepest face sets this one",
+            )
+        }
+    };
+    if !(spacing_mm > 0.0 && spacing_mm <= diameter_mm) {
+        return Err(Error::Stepover { stepover_mm: spacing_mm, diameter_mm });
+    }
+    let stepover = (spacing_mm / site.unit_mm + 1e-9).floor();
+    if stepover < 1.0 {
+        return Err(Error::StepoverUnit { stepover_mm: spacing_mm, unit_mm: site.unit_mm, hint });
+    }
+    // Past an open edge as far as the cutter can touch the border's steepest face.
+    let past = 2.0 * site.surface.lattice().step_mm;
+    let overrun_mm = [slope_along, slope_across].map(|slope| contact_radius_mm(&params.shape, slope) + past);
+    site.validate(overrun_mm[0].max(overrun_mm[1]) + spacing_mm + diameter_mm)?;
+    Ok(Layout::covering(site, along, stepover as i32, overrun_mm))
+}
+
+/// A cut without a break: vertices along the pass and up, in units.
+type Run = Vec<[i32; 2]>;
+
+/// Plans the passes of a finishing or semi-finishing operation, band by band.
+///
+/// The swept cutter stays at or above the samples plus `stock_to_leave_mm`, less the budget; every vertex is on
+/// the controller's grid. The same path whatever the number of threads.
+pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpath, Error> {
+    let layout = layout(site, params)?;
+    let lattice = site.surface.lattice();
+    let cutter = Cutter::new(params.shape, lattice.step_mm, layout.pitch_mm(), site.budget)?;
+    let stepover_mm = match layout.passes[..] {
+        [first, second, ..] => f64::from(second - first) * site.unit_mm,
+        _ => 2.0 * params.shape.radius_mm(),
+    };
+    let longest_mm = link::LONGEST_STEPOVERS * stepover_mm;
+    let passes = layout.passes.len();
+    let mut pen = Pen::new(site);
+    let mut before: Option<(usize, GridPoint)> = None;
+    let mut since_retract = 0;
+    let mut first = 0;
+    while first < passes {
+        let last = first + band_length(&layout, first, lattice.step_mm, cutter.reach_mm) - 1;
+        // The link from the band before is judged in this band.
+        let low_mm = layout.across_mm(first) - longest_mm;
+        let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), cutter.reach_mm)?;
+        let envelopes = cutter.envelopes(&strip, &layout, first..last + 1);
+        let band: Vec<Vec<Run>> = (first..last + 1)
+            .into_par_iter()
+            .zip(envelopes)
+            .map(|(k, envelope)| {
+                let mut runs = pass(site, params, &layout, &envelope);
+                if backwards(params.pattern, layout.along, k) {
+                    runs.reverse();
+                    runs.iter_mut().for_each(|run| run.reverse());
+                }
+                runs
+            })
+            .collect();
+        let joints = joints(&layout, first, &band, before);
+        let links: Vec<Option<i32>> = joints
+            .par_iter()
+            .map(|&(from, to)| {
+                if params.pattern == Pattern::OneWay {
+                    return None;
+                }
+                link::level(site, &cutter, &strip, from, to, params.stock_to_leave_mm, longest_mm)
+            })
+            .collect();
+        let mut links = links.into_iter();
+        for (offset, runs) in band.iter().enumerate() {
+            let k = first + offset;
+            let across = layout.passes[k];
+            for (nth, run) in runs.iter().enumerate() {
+                let start = [run[0][0], across, run[0][1]];
+                let linked = match before {
+                    Some((_, from)) if nth == 0 => links.next().flatten().map(|z| (from, z)),
+                    _ => None,
+                };
+                let forced = params.restart_passes > 0 && since_retract >= params.restart_passes;
+                match linked.filter(|_| !forced) {
+                    Some((from, z)) => {
+                        pen.cut(layout.along.point(from[0], from[1], z));
+                        pen.cut(layout.along.point(start[0], start[1], z));
+                        pen.cut(layout.along.point(start[0], start[1], start[2]));
+                    }
+                    None => {
+                        let top = pen.top();
+                        pen.begin(layout.along.point(start[0], start[1], start[2]), top);
+                        since_retract = 0;
+                    }
+                }
+                for &[u, z] in &run[1..] {
+                    pen.cut(layout.along.point(u, across, z));
+                }
+                let end = run[run.len() - 1];
+                before = Some((k, [end[0], across, end[1]]));
+            }
+            since_retract += 1;
+        }
+        first = last + 1;
+        progress(first as f64 / passes as f64);
+    }
+    if before.is_none() {
+        return Err(Error::NoData { samples: lattice.columns * lattice.rows });
+    }
+    Ok(pen.finish())
+}
+
+/// Whether a pass runs towards lower coordinates. Passes follow each other towards higher ones, so the
+/// uncut side of a pass along X is on the right when it runs to -X, of one along Y when it runs to +Y.
+fn backwards(pattern: Pattern, along: Axis, k: usize) -> bool {
+    match pattern {
+        Pattern::Zigzag => k % 2 == 1,
+        Pattern::OneWay => along == Axis::X,
+    }
+}
+
+/// From the end of each pass to the begin of the next one that cuts.
+fn joints(
+    layout: &Layout,
+    first: usize,
+    band: &[Vec<Run>],
+    before: Option<(usize, GridPoint)>,
+) -> Vec<(GridPoint, GridPoint)> {
+    let mut end = before.map(|(_, at)| at);
+    let mut out = Vec::new();
+    for (offset, runs) in band.iter().enumerate() {
+        let across = layout.passes[first + offset];
+        let (Some(head), Some(tail)) = (runs.first(), runs.last()) else { continue };
+        if let Some(from) = end {
+            out.push((from, [head[0][0], across, head[0][1]]));
+        }
+        let at = tail[tail.len() - 1];
+        end = Some([at[0], across, at[1]]);
+    }
+    out
+}
+
+/// The cuts of one pass, towards higher coordinates.
+fn pass(site: &Site, params: &Params, layout: &Layout, envelope: &Envelope) -> Vec<Run> {
+    let simplify = site.budget.simplify_mm / site.unit_mm;
+    let excess = 1.0 + EXCESS_MM / site.unit_mm;
+    let mut out = Vec::new();
+    let mut i = 0;
+    while i < layout.count {
+        if envelope.cl_mm[i].is_nan() {
+            i += 1;
+            continue;
+        }
+        let end = i + envelope.cl_mm[i..].iter().take_while(|z| !z.is_nan()).count();
+        // A single position covers no length.
+        if end - i >= 2 {
+            let wanted: Vec<f64> =
+                envelope.bound_mm[i..end].iter().map(|&z| site.units(z + params.stock_to_leave_mm)).collect();
+            let low: Vec<f64> = wanted.iter().map(|w| w - simplify).collect();
+            let high: Vec<f64> = wanted.iter().map(|w| w + excess).collect();
+            let vertices = funnel::simplify(&low, &high, &wanted);
+            out.push(vertices.into_iter().map(|(at, z)| [layout.at(i + at), z]).collect());
+        }
+        i = end;
+    }
+    out
+}

@@ -1,0 +1,459 @@
+//! An interpreter of RML-1 after Roland's "RML-1 Programing Guideline" (2002), for three axes.
+//!
+//! Mode 1 (one letter, `^` before a mode 2 command), mode 2 (two letters) and the common `!`
+//! commands are read; a text keeps to the mode it began in, since EGX-300 class machines have one. An
+//! out-of-range value is refused, where the machine would clamp it.
+
+use std::io::BufRead;
+
+use super::error::{Error, Place};
+use super::reading::{Event, Language, Motion, Options, Summary};
+
+/// The range of RML-1's float parameter.
+const LOWEST: f64 = -8_388_608.0;
+const HIGHEST: f64 = 8_388_607.0;
+const MOST_NUMBERS: usize = 3 * 4096;
+
+type Sink<'a> = dyn FnMut(&Event) -> Result<(), Error> + 'a;
+
+/// Reads RML-1 command by command.
+pub(super) fn read(source: &mut dyn BufRead, options: &Options, each: &mut Sink) -> Result<Summary, Error> {
+    let mut scanner = Scanner { source, next: None, line: 1, column: 0, bytes: 0 };
+    scanner.advance()?;
+    let mut machine = Machine {
+        unit_mm: options.rml_unit_mm,
+        at_mm: [f64::NAN; 3],
+        relative: false,
+        speed_3d_mm_s: None,
+        speed_down_mm_s: None,
+        down_units: 0.0,
+        up_units: None,
+        dwell_ms: 0.0,
+        began: None,
+    };
+    let mut summary = Summary { language: Language::Rml1, blocks: 0, bytes: 0, notes: Vec::new() };
+    let mut numbers = Vec::new();
+    while let Some((command, at)) = scanner.command(&mut numbers)? {
+        summary.blocks += 1;
+        machine.run(command, &numbers, at, each)?;
+    }
+    summary.bytes = scanner.bytes;
+    if summary.blocks == 0 {
+        return Err(Error::Empty);
+    }
+    Ok(summary)
+}
+
+/// A command's spelling without its parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Command {
+    name: &'static str,
+    /// 0 for the commands common to both modes.
+    mode: u8,
+}
+
+/// Every command that is known, read or refused by name.
+const COMMANDS: [(&str, u8); 28] = [
+    ("D", 1),
+    ("F", 1),
+    ("H", 1),
+    ("I", 1),
+    ("J", 1),
+    ("M", 1),
+    ("R", 1),
+    ("V", 1),
+    ("W", 1),
+    ("Z", 1),
+    ("@", 1),
+    ("DF", 2),
+    ("IN", 2),
+    ("PA", 2),
+    ("PD", 2),
+    ("PR", 2),
+    ("PU", 2),
+    ("VS", 2),
+    ("!DW", 0),
+    ("!MC", 0),
+    ("!NR", 0),
+    ("!PZ", 0),
+    ("!RC", 0),
+    ("!VZ", 0),
+    ("!ZM", 0),
+    ("!ZZ", 0),
+    ("!ZO", 0),
+    ("!ZE", 0),
+];
+
+fn known(name: &str) -> Option<Command> {
+    COMMANDS.iter().find(|c| c.0 == name).map(|&(name, mode)| Command { name, mode })
+}
+
+/// A parameter and where it stands.
+#[derive(Clone, Copy)]
+struct Number {
+    value: f64,
+    at: Place,
+}
+
+struct Scanner<'a> {
+    source: &'a mut dyn BufRead,
+    next: Option<u8>,
+    line: u64,
+    column: u64,
+    bytes: u64,
+}
+
+impl Scanner<'_> {
+    fn advance(&mut self) -> Result<(), Error> {
+        if self.next == Some(b'\n') {
+            self.line += 1;
+            self.column = 0;
+        }
+        self.next = self.source.fill_buf()?.first().copied();
+        if let Some(byte) = self.next {
+            self.source.consume(1);
+            self.column += 1;
+            self.bytes += 1;
+            if byte >= 0x7f || (byte < 0x20 && !matches!(byte, b'\t' | b'\r' | b'\n')) {
+                return Err(Error::NotAscii { at: self.at(), byte });
+            }
+        }
+        Ok(())
+    }
+
+    fn at(&self) -> Place {
+        Place { line: self.line, column: self.column }
+    }
+
+    fn letter(&self) -> Option<u8> {
+        self.next.map(|b| b.to_ascii_uppercase()).filter(u8::is_ascii_uppercase)
+    }
+
+    /// The next command with its numbers, up to its terminator or the next command.
+    fn command(&mut self, numbers: &mut Vec<Number>) -> Result<Option<(Command, Place)>, Error> {
+        while self.next.is_some_and(|b| b <= b' ' || b == b';') {
+            self.advance()?;
+        }
+        let at = self.at();
+        let Some(first) = self.next else { return Ok(None) };
+        let command = match first.to_ascii_uppercase() {
+            b'0'..=b'9' | b'+' | b'-' | b'.' | b',' => return Err(Error::Loose { at }),
+            mark @ (b'!' | b'^') => {
+                self.advance()?;
+                let mut name = String::new();
+                if mark == b'!' {
+                    name.push('!');
+                }
+                while name.len() < 2 + usize::from(mark == b'!') {
+                    let Some(letter) = self.letter() else {
+                        return Err(Error::Command {
+                            at,
+                            name: format!("{}{}", first as char, name.trim_start_matches('!')),
+                        });
+                    };
+                    name.push(letter as char);
+                    self.advance()?;
+                }
+                let command = known(&name).filter(|c| c.mode != 1);
+                let command = command.ok_or_else(|| {
+                    let mark = if mark == b'^' { "^" } else { "" };
+                    Error::Command { at, name: format!("{mark}{name}") }
+                })?;
+                // ^ makes a mode 2 command one of mode 1.
+                Command { mode: if mark == b'^' { 1 } else { 0 }, ..command }
+            }
+            b'@' => {
+                self.advance()?;
+                Command { name: "@", mode: 1 }
+            }
+            letter @ b'A'..=b'Z' => {
+                self.advance()?;
+                let pair = self.letter().map(|second| format!("{}{}", letter as char, second as char));
+                if let Some(command) = pair.as_deref().and_then(known) {
+                    self.advance()?;
+                    command
+                } else {
+                    let name = (letter as char).to_string();
+                    known(&name).ok_or_else(|| Error::Command { at, name: pair.unwrap_or(name) })?
+                }
+            }
+            other => return Err(Error::Command { at, name: (other as char).to_string() }),
+        };
+        self.numbers(numbers)?;
+        if self.next.is_none() {
+            return Err(Error::Terminator { at });
+        }
+        Ok(Some((command, at)))
+    }
+
+    fn blanks(&mut self) -> Result<(), Error> {
+        while self.next == Some(b' ') {
+            self.advance()?;
+        }
+        Ok(())
+    }
+
+    fn numbers(&mut self, numbers: &mut Vec<Number>) -> Result<(), Error> {
+        numbers.clear();
+        self.blanks()?;
+        while matches!(self.next, Some(b'0'..=b'9' | b'+' | b'-' | b'.')) {
+            let at = self.at();
+            numbers.push(Number { value: self.number()?, at });
+            if numbers.len() > MOST_NUMBERS {
+                return Err(Error::LineTooLong { line: at.line, most: MOST_NUMBERS });
+            }
+            self.blanks()?;
+            if self.next != Some(b',') {
+                break;
+            }
+            self.advance()?;
+            self.blanks()?;
+            if !matches!(self.next, Some(b'0'..=b'9' | b'+' | b'-' | b'.')) {
+                return Err(Error::NumberMissing { at: self.at(), letter: ',' });
+            }
+        }
+        Ok(())
+    }
+
+    fn number(&mut self) -> Result<f64, Error> {
+        let at = self.at();
+        let mut text = String::new();
+        while let Some(byte @ (b'0'..=b'9' | b'+' | b'-' | b'.')) = self.next {
+            text.push(byte as char);
+            if text.len() > 40 {
+                return Err(Error::NumberMalformed { at, letter: ',' });
+            }
+            self.advance()?;
+        }
+        text.parse().map_err(|_| Error::NumberMalformed { at, letter: ',' })
+    }
+}
+
+struct Machine {
+    unit_mm: f64,
+    at_mm: [f64; 3],
+    relative: bool,
+    /// V, !VZ.
+    speed_3d_mm_s: Option<f64>,
+    /// F, VS.
+    speed_down_mm_s: Option<f64>,
+    /// !PZ, @: the tool's two heights; the upper is unknown until named.
+    down_units: f64,
+    up_units: Option<f64>,
+    dwell_ms: f64,
+    began: Option<u8>,
+}
+
+fn ranged(number: Number, what: &'static str, low: f64, high: f64) -> Result<f64, Error> {
+    if (low..=high).contains(&number.value) {
+        Ok(number.value)
+    } else {
+        Err(Error::Range { at: number.at, what, value: number.value, low, high })
+    }
+}
+
+fn coordinate(number: Number) -> Result<f64, Error> {
+    let value = ranged(number, "the coordinate in units", LOWEST, HIGHEST)?;
+    if value.fract() == 0.0 { Ok(value) } else { Err(Error::Fraction { at: number.at, value }) }
+}
+
+impl Machine {
+    fn run(&mut self, command: Command, numbers: &[Number], at: Place, each: &mut Sink) -> Result<(), Error> {
+        let name = command.name;
+        if command.mode != 0 {
+            let began = *self.began.get_or_insert(command.mode);
+            if began != command.mode {
+                let hint = if began == 1 {
+                    format!("in mode 1 write ^{name} for a mode 2 command")
+                } else {
+                    "stay in mode 2".to_string()
+                };
+                return Err(Error::Mode { at, command: name, mode: command.mode, began, hint });
+            }
+        }
+        let count = |allowed: fn(usize) -> bool, wanted: &'static str| {
+            if allowed(numbers.len()) {
+                Ok(())
+            } else {
+                Err(Error::Count { at, command: name, found: numbers.len(), wanted })
+            }
+        };
+        let line = u32::try_from(at.line).unwrap_or(u32::MAX);
+        match name {
+            "DF" | "IN" => {
+                count(|n| n == 0, "none")?;
+                self.relative = false;
+                self.speed_3d_mm_s = None;
+                self.speed_down_mm_s = None;
+                (self.down_units, self.up_units) = (0.0, None);
+                self.dwell_ms = 0.0;
+                if name == "IN" {
+                    self.at_mm = [f64::NAN; 3];
+                }
+            }
+            "PA" | "PR" => {
+                count(|n| n % 2 == 0, "pairs of x, y")?;
+                self.relative = name == "PR";
+                if !numbers.is_empty() {
+                    // The tool's state decides how a bare PA moves, and the text may not tell it.
+                    return Err(Error::Unread {
+                        at,
+                        code: "PA x,y",
+                        what: "a move in the tool's last state",
+                        hint: "write PU or PD with the coordinates",
+                    });
+                }
+            }
+            "V" | "!VZ" | "F" | "VS" => {
+                count(|n| n == 1, "one speed in mm/s")?;
+                let speed = Some(ranged(numbers[0], "the speed in mm/s", 0.1, 1000.0)?);
+                if matches!(name, "V" | "!VZ") {
+                    self.speed_3d_mm_s = speed;
+                } else {
+                    self.speed_down_mm_s = speed;
+                }
+            }
+            "W" | "!DW" => {
+                count(|n| n <= 1, "one time in ms")?;
+                self.dwell_ms =
+                    numbers.first().map_or(Ok(0.0), |n| ranged(*n, "the dwell in ms", 0.0, 32_767.0))?;
+            }
+            "!MC" => {
+                count(|n| n <= 1, "one switch")?;
+                for number in numbers {
+                    ranged(*number, "the switch", -32_768.0, 32_767.0)?;
+                }
+            }
+            "!RC" => {
+                count(|n| n == 1, "one speed code")?;
+                ranged(numbers[0], "the speed code", 0.0, 32_767.0)?;
+            }
+            "J" => {
+                count(|n| n == 1, "one tool number")?;
+                each(&Event::Pause { line })?;
+            }
+            "!NR" => {
+                count(|n| n == 0, "none")?;
+                each(&Event::Pause { line })?;
+            }
+            "!PZ" | "@" => {
+                count(|n| n == 1 || n == 2, "one or two heights")?;
+                self.down_units = coordinate(numbers[0])?;
+                if let Some(up) = numbers.get(1) {
+                    self.up_units = Some(coordinate(*up)?);
+                }
+            }
+            "H" => {
+                count(|n| n == 0, "none")?;
+                // To the top, then to the origin: where the top is, only the machine knows.
+                let up = [self.at_mm[0], self.at_mm[1], f64::NAN];
+                self.go(up, f64::INFINITY, line, each)?;
+                self.at_mm = [f64::NAN; 3];
+            }
+            "!ZM" => {
+                count(|n| n == 1, "one z")?;
+                let speed = self.speed(true, at, name)?;
+                let to = [self.at_mm[0], self.at_mm[1], self.axis(2, coordinate(numbers[0])?)];
+                self.go(to, speed, line, each)?;
+            }
+            "Z" | "!ZZ" => {
+                count(|n| n > 0 && n.is_multiple_of(3), "triples of x, y, z")?;
+                let speed = self.speed(true, at, name)?;
+                for point in numbers.chunks_exact(3) {
+                    let to = [
+                        self.axis(0, coordinate(point[0])?),
+                        self.axis(1, coordinate(point[1])?),
+                        self.axis(2, coordinate(point[2])?),
+                    ];
+                    self.cut(to, speed, line, at, each)?;
+                }
+            }
+            "PU" | "M" | "R" => {
+                count(|n| n.is_multiple_of(2), "pairs of x, y")?;
+                let up = self.up_units.map_or(f64::NAN, |z| z * self.unit_mm);
+                self.go([self.at_mm[0], self.at_mm[1], up], f64::INFINITY, line, each)?;
+                for point in numbers.chunks_exact(2) {
+                    let to = self.flat(point, name, up)?;
+                    self.go(to, f64::INFINITY, line, each)?;
+                }
+            }
+            "PD" | "D" | "I" => {
+                count(|n| n.is_multiple_of(2), "pairs of x, y")?;
+                let down = self.down_units * self.unit_mm;
+                let plunge = self.speed(true, at, name)?;
+                self.cut([self.at_mm[0], self.at_mm[1], down], plunge, line, at, each)?;
+                if !numbers.is_empty() {
+                    let speed = self.speed(false, at, name)?;
+                    for point in numbers.chunks_exact(2) {
+                        let to = self.flat(point, name, down)?;
+                        self.cut(to, speed, line, at, each)?;
+                    }
+                }
+            }
+            "!ZO" => {
+                return Err(Error::Unread {
+                    at,
+                    code: "!ZO",
+                    what: "a new Z origin",
+                    hint: "set the origin on the machine",
+                });
+            }
+            _ => {
+                return Err(Error::Unread {
+                    at,
+                    code: "!ZE",
+                    what: "a move by lettered axes",
+                    hint: "write it with Z or !ZZ",
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn speed(&self, three_axes: bool, at: Place, command: &'static str) -> Result<f64, Error> {
+        let (value, speed) =
+            if three_axes { (self.speed_3d_mm_s, "V or !VZ") } else { (self.speed_down_mm_s, "F or VS") };
+        value.map(|mm_s| 60.0 * mm_s).ok_or(Error::Speed { at, command, speed })
+    }
+
+    /// Units to mm. A whole number of hundredths divided by 100 is the nearest double to what the
+    /// same point says in G-code.
+    fn axis(&self, axis: usize, units: f64) -> f64 {
+        let mm = self.mm(units);
+        if self.relative { self.at_mm[axis] + mm } else { mm }
+    }
+
+    fn mm(&self, units: f64) -> f64 {
+        if self.unit_mm == 0.01 { units / 100.0 } else { units * self.unit_mm }
+    }
+
+    fn flat(&self, point: &[Number], name: &str, z_mm: f64) -> Result<[f64; 3], Error> {
+        let units = [coordinate(point[0])?, coordinate(point[1])?];
+        let relative = match name {
+            "M" | "D" => false,
+            "R" | "I" => true,
+            _ => self.relative,
+        };
+        let at = |axis: usize| {
+            let mm = self.mm(units[axis]);
+            if relative { self.at_mm[axis] + mm } else { mm }
+        };
+        Ok([at(0), at(1), z_mm])
+    }
+
+    fn cut(&mut self, to: [f64; 3], speed: f64, line: u32, at: Place, each: &mut Sink) -> Result<(), Error> {
+        if to.iter().any(|v| v.is_nan()) {
+            return Err(Error::Nowhere { at, axes: "an axis" });
+        }
+        self.go(to, speed, line, each)
+    }
+
+    /// The modal dwell comes before every motion.
+    fn go(&mut self, to_mm: [f64; 3], speed_mm_min: f64, line: u32, each: &mut Sink) -> Result<(), Error> {
+        if self.dwell_ms > 0.0 {
+            each(&Event::Dwell { seconds: 1e-3 * self.dwell_ms, line })?;
+        }
+        self.at_mm = to_mm;
+        each(&Event::Move(Motion { to_mm, feed_mm_min: speed_mm_min as f32, line }))
+    }
+}

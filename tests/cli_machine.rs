@@ -1,0 +1,54 @@
+//! The commands on data files, as sentences.
+
+use assert_cmd::Command;
+use predicates::prelude::PredicateBooleanExt as _;
+use predicates::str::contains;
+
+fn screenmill(arguments: &str) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("screenmill").expect("built").args(arguments.split(' ')).assert()
+}
+
+fn json(arguments: &str) -> serde_json::Value {
+    let output = screenmill(arguments).success().get_output().stdout.clone();
+    assert_eq!(output.iter().filter(|&&b| b == b'\n').count(), 1, "one object on one line");
+    serde_json::from_slice(&output).expect("JSON")
+}
+
+#[test]
+fn each_list_names_what_comes_along() {
+    screenmill("machines").success().stdout(contains("roland-egx-600").and(contains("610 x 407 x 42.5*")));
+    screenmill("posts").success().stdout(contains("rml1").and(contains("roland-egx-600, roland-srm-20")));
+    screenmill("fixtures").success().stdout(contains("vacuum-plate").and(contains("clamps")));
+    screenmill("tools").success().stdout(contains("ball-0.5").and(contains("320, 80")));
+}
+
+#[test]
+fn each_list_is_one_json_object() {
+    assert_eq!(json("machines --json")["machines"][3]["travel"]["z_mm"], 42.5);
+    assert_eq!(json("posts --json")["posts"][2]["unit_mm"], 0.01);
+    assert_eq!(json("fixtures --json")["fixtures"][0]["clamp"][0]["reach_mm"], 6.0);
+    assert_eq!(json("tools --json --library tools-srm-20")["tools"][0]["spindle_rpm"], 7000.0);
+}
+
+#[test]
+fn one_machine_is_shown_whole_with_what_nobody_confirms() {
+    screenmill("machines roland-egx-600")
+        .success()
+        .stdout(contains("set = \"code-0-15\"").and(contains("verify against your machine")));
+    assert_eq!(json("tools ball-1 --json")["max_depth_mm"], 0.15);
+    screenmill("posts rml1").success().stdout(contains("!MC0"));
+    screenmill("fixtures clamps").success().stdout(contains("reach_mm = 6.0"));
+}
+
+#[test]
+fn what_is_shown_of_a_machine_is_a_profile_again() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    for (command, name) in [("machines", "roland-srm-20"), ("posts", "grbl"), ("fixtures", "clamps")] {
+        let shown = screenmill(&format!("{command} {name}")).success().get_output().stdout.clone();
+        let file = folder.path().join("own.toml");
+        std::fs::write(&file, &shown).expect("writable");
+        let again =
+            screenmill(&format!("{command} {}", file.display())).success().get_output().stdout.clone();
+        assert_eq!(String::from_utf8(again).ok(), String::from_utf8(shown).ok());
+    }
+}

@@ -1,0 +1,206 @@
+//! `simulate` and `estimate` as a shop floor uses them.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use screenmill::grid::{Heights, Window};
+use screenmill::surface::{HeightWriter, Options, open};
+use serde_json::Value;
+
+const COLUMNS: usize = 300;
+const ROWS: usize = 200;
+const STEP_MM: f64 = 0.02;
+
+/// 6 x 4 mm: a plane that falls to the right from z = 5.4 to z = 4.8.
+fn height(x_mm: f64) -> f64 {
+    5.4 - 0.1 * x_mm
+}
+
+fn part(dir: &Path) {
+    let window = Window { column: 0, row: 0, columns: COLUMNS, rows: ROWS };
+    let row = (0..COLUMNS).map(|c| height((c as f64 + 0.5) * STEP_MM) as f32);
+    let z_mm = row.cycle().take(COLUMNS * ROWS).collect();
+    let mut writer =
+        HeightWriter::create(&dir.join("H.tif"), COLUMNS, ROWS, STEP_MM, [0.0, 1.0]).expect("H.tif");
+    writer.write(&Heights { window, z_mm }).expect("a band");
+    writer.finish().expect("whole");
+}
+
+/// Ball passes on the plane, in a frame whose zero is the lower left corner at z = 5.4.
+fn program(shift_mm: f64) -> String {
+    let lift = 0.5 * (1.01f64.sqrt() - 1.0) + 0.0002;
+    let mut text = String::from("G21 G90 G17 G64 P0.001\nM3 S20000\nG4 P2\nG0 Z2\nG0 X-1 Y-0.6\n");
+    let mut y = -0.6;
+    while y < 4.6 {
+        text += &format!("G0 Z2\nG0 X{:.4} Y{y:.4}\n", shift_mm - 1.0);
+        text += &format!("G1 Z{:.4} F100\nG1 X{:.4} Z{:.4} F320\n", 0.1 + lift, shift_mm + 7.0, -0.7 + lift);
+        y += 0.05;
+    }
+    text + "G0 Z2\nM5\nM2\n"
+}
+
+fn screenmill() -> Command {
+    Command::cargo_bin("screenmill").expect("the binary")
+}
+
+fn simulate(dir: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
+    let mut command = screenmill();
+    command.current_dir(dir).args(["simulate", "p.ngc", "--part", "H.tif", "--out", "out"]);
+    if !more.contains(&"--cutter") {
+        command.args(["--cutter", "ball:1"]);
+    }
+    if !more.contains(&"--zero") {
+        command.args(["--zero", "0", "0", "5.4"]);
+    }
+    command.args(["--stock-top-mm", "5.6", "--quiet"]).args(more).assert()
+}
+
+fn report(dir: &Path) -> Value {
+    let text = std::fs::read_to_string(dir.join("out/report.json")).expect("a report");
+    serde_json::from_str(&text).expect("JSON")
+}
+
+fn heights(path: &Path) -> Vec<f32> {
+    let opened = open(path, &Options::at_step(STEP_MM)).expect("a map");
+    opened.surface.heights(opened.surface.lattice().window(), 0.0).expect("heights").z_mm
+}
+
+fn figure(report: &Value, key: &str) -> f64 {
+    report["fidelity"][key].as_f64().unwrap_or_else(|| panic!("{key} in {report}"))
+}
+
+#[test]
+fn a_sound_program_passes() {
+    let dir = tempfile::tempdir().expect("a folder");
+    part(dir.path());
+    std::fs::write(dir.path().join("p.ngc"), program(0.0)).expect("a program");
+    simulate(dir.path(), &["--machine", "linuxcnc-mill"]).success();
+    let report = report(dir.path());
+    assert_eq!(report["verdict"], "pass");
+    assert_eq!(figure(&report, "gouge_max_mm"), 0.0);
+    // 0.2 um of lift and the scallop of 0.05 mm passes, 0.63 um.
+    assert!(figure(&report, "excess_max_mm") < 0.0009, "{report}");
+    assert!(figure(&report, "normal_p95_deg") < 3.0, "{report}");
+    assert!(report["time_s"]["total"].as_f64().expect("a time") > 150.0);
+    let bite = report["programs"][0]["deepest_bite_mm"].as_f64().expect("a bite");
+    assert!((0.3..0.81).contains(&bite), "{bite}");
+    let machined = heights(&dir.path().join("out/machined.tif"));
+    let deviation = heights(&dir.path().join("out/deviation.tif"));
+    for (i, (z, d)) in machined.iter().zip(&deviation).enumerate() {
+        let design = height(((i % COLUMNS) as f64 + 0.5) * STEP_MM);
+        // Floats at 5 mm hold half a micrometre's thousandth.
+        assert!((f64::from(*z) - design - f64::from(*d)).abs() < 2e-6, "sample {i}");
+    }
+}
+
+#[test]
+fn one_wrong_z_word_changes_the_verdict() {
+    let dir = tempfile::tempdir().expect("a folder");
+    part(dir.path());
+    let wrong = program(0.0).replacen("Z-0.69", "Z-0.79", 50).replacen("Z-0.79", "Z-0.69", 49);
+    assert_ne!(wrong, program(0.0));
+    std::fs::write(dir.path().join("p.ngc"), wrong).expect("a program");
+    simulate(dir.path(), &[]).code(1).stdout(predicate::str::contains("error: the cut goes 0.0"));
+    let report = report(dir.path());
+    assert_eq!(report["verdict"], "fail");
+    assert_eq!(report["findings"][0]["code"], "gouge");
+    assert!(figure(&report, "gouge_max_mm") > 0.05);
+}
+
+#[test]
+fn a_program_for_another_origin_is_told() {
+    let dir = tempfile::tempdir().expect("a folder");
+    part(dir.path());
+    std::fs::write(dir.path().join("p.ngc"), program(20.0)).expect("a program");
+    simulate(dir.path(), &[])
+        .code(1)
+        .stdout(predicate::str::contains("hint: another part, or another --zero"));
+    simulate(dir.path(), &["--zero", "-20", "0", "5.4"]).success();
+    // Zero far above the part: nothing is cut.
+    simulate(dir.path(), &["--zero", "-20", "0", "15.4"]).success().stdout(
+        predicate::str::contains("cuts nothing").and(predicate::str::contains("100.0 % of the part")),
+    );
+}
+
+#[test]
+fn another_cutter_shows_as_gouge() {
+    let dir = tempfile::tempdir().expect("a folder");
+    part(dir.path());
+    std::fs::write(dir.path().join("p.ngc"), program(0.0)).expect("a program");
+    simulate(dir.path(), &["--cutter", "flat:1"]).code(1).stdout(predicate::str::contains("below the part"));
+}
+
+#[test]
+fn a_rapid_through_stock_is_a_collision() {
+    let dir = tempfile::tempdir().expect("a folder");
+    part(dir.path());
+    let text =
+        program(0.0).replacen("G0 X-1.0000 Y1.0000", "G0 X-1.0000 Y1.0000\nG0 Z-0.05\nG0 X1\nG0 X-1", 1);
+    std::fs::write(dir.path().join("p.ngc"), text).expect("a program");
+    simulate(dir.path(), &[]).code(1).stdout(predicate::str::contains("a rapid cuts 0."));
+    let report = report(dir.path());
+    let findings = report["findings"].as_array().expect("findings");
+    assert!(findings.iter().any(|f| f["code"] == "rapid-through-stock"), "{report}");
+}
+
+#[test]
+fn what_cannot_be_judged_is_refused_and_leaves_nothing() {
+    let dir = tempfile::tempdir().expect("a folder");
+    part(dir.path());
+    let whole = program(0.0);
+    std::fs::write(dir.path().join("p.ngc"), &whole[..whole.len() / 2]).expect("a program");
+    simulate(dir.path(), &[]).code(2).stderr(predicate::str::starts_with("error: p.ngc: line "));
+    std::fs::write(dir.path().join("p.ngc"), &whole).expect("a program");
+    simulate(dir.path(), &["--cutter", "ball:1", "ball:0.5"]).code(2).stderr(
+        "error: 1 programs and 2 cutters; hint: --cutter takes one cutter per program, in their order\n",
+    );
+    simulate(dir.path(), &["--cutter", "ball:1", "--machine", "nothing"]).code(2);
+    simulate(dir.path(), &["--zero", "0", "0", "1e9"])
+        .code(2)
+        .stderr("error: --zero names 1000000000 mm; hint: it must lie in -100000 .. 100000\n");
+    assert!(!dir.path().join("out").exists());
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let dir = tempfile::tempdir().expect("a folder");
+    part(dir.path());
+    std::fs::write(dir.path().join("p.ngc"), program(0.0)).expect("a program");
+    let files = ["machined.tif", "deviation.tif", "report.json"];
+    let run = |threads: &str| {
+        simulate(dir.path(), &["--threads", threads]).success();
+        files.map(|name| std::fs::read(dir.path().join("out").join(name)).expect("a file"))
+    };
+    assert!(run("1") == run("3"));
+}
+
+#[test]
+fn an_estimate_says_what_limits() {
+    let dir = tempfile::tempdir().expect("a folder");
+    std::fs::write(dir.path().join("p.ngc"), program(0.0)).expect("a program");
+    let rml = "^DF;!MC1;V30;Z0,0,500;V5;Z0,0,-10,3000,0,-10;V30;Z3000,0,500;H;\n";
+    std::fs::write(dir.path().join("p.rml"), rml).expect("a program");
+    let output = screenmill()
+        .current_dir(dir.path())
+        .args(["estimate", "p.ngc", "p.rml", "--machine", "roland-egx-600", "--json"])
+        .assert()
+        .success();
+    let report: Value = serde_json::from_slice(&output.get_output().stdout).expect("one JSON object");
+    let total = report["time_s"].as_f64().expect("a time");
+    let programs = report["programs"].as_array().expect("programs");
+    let sum: f64 = programs.iter().map(|p| p["time_s"].as_f64().expect("a time")).sum();
+    assert!((total - sum).abs() < 1e-9 && total > 150.0, "{report}");
+    assert_eq!(report["limited_by"], "feed");
+    assert_eq!(programs[1]["language"], "RML-1");
+    assert_eq!(programs[1]["rapid_mm"], 5.1);
+    assert_eq!(programs[1]["bounds_mm"]["z"], serde_json::json!([-0.1, 5.0]));
+    screenmill()
+        .current_dir(dir.path())
+        .args(["estimate", "p.ngc", "--machine", "linuxcnc-mill"])
+        .assert()
+        .success()
+        .stdout(
+            predicate::str::contains("cutting").and(predicate::str::contains("verify against your machine")),
+        );
+}

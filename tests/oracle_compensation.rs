@@ -1,0 +1,164 @@
+//! Compensation against the definitions, to the bit.
+
+#[path = "compensation/naive.rs"]
+mod naive;
+#[path = "compensation/surfaces.rs"]
+mod surfaces;
+
+use naive::Cutter;
+use rayon::prelude::*;
+use screenmill::compensation::{self as fast, Profile, RowPass, RowTarget};
+use screenmill::grid::{Heights, Window};
+use surfaces::STEP_MM;
+
+fn cutter(text: &str, allowance_mm: f64) -> (Profile, Cutter) {
+    let shape = text.parse().expect("a cutter");
+    let profile = Profile::new(shape, STEP_MM, allowance_mm).expect("a profile");
+    (profile, Cutter { shape, step_mm: STEP_MM, allowance_mm })
+}
+
+#[track_caller]
+fn same(what: &str, got: &[f32], want: &[f32]) {
+    assert_eq!(got.len(), want.len(), "{what}");
+    let bits = |z: f32| if z.is_nan() { None } else { Some(z.to_bits()) };
+    let wrong = got.iter().zip(want).filter(|(g, w)| bits(**g) != bits(**w)).count();
+    if let Some(i) = got.iter().zip(want).position(|(g, w)| bits(*g) != bits(*w)) {
+        panic!(
+            "{what}: {wrong} of {} differ, the first at {i}: {} instead of {}",
+            got.len(),
+            got[i],
+            want[i]
+        );
+    }
+}
+
+/// A window that is off the surface's own on every side but one.
+fn reaching_past(h: &Heights) -> Window {
+    Window { column: -13, row: -9, columns: h.window.columns + 21, rows: h.window.rows + 9 }
+}
+
+fn cutter_locations(cutters: &[&str], n: usize) {
+    surfaces::all(n).par_iter().for_each(|(name, h)| {
+        for text in cutters {
+            let (profile, twin) = cutter(text, 0.0);
+            let out = reaching_past(h);
+            let got = fast::cutter_location(h, &profile, out);
+            let want = naive::cutter_location(h, &twin, out, 1);
+            assert_eq!(got.window, out);
+            same(&format!("{text} on {name}"), &got.z_mm, &want.z_mm);
+        }
+    });
+}
+
+#[test]
+fn balls_on_every_surface() {
+    cutter_locations(&["ball:0.15", "ball:0.2", "ball:0.5", "ball:0.02"], 150);
+}
+
+#[test]
+fn a_large_ball_on_every_surface() {
+    cutter_locations(&["ball:1"], 130);
+}
+
+#[test]
+fn flats_on_every_surface() {
+    cutter_locations(&["flat:0.02", "flat:0.2", "flat:0.5", "flat:0.73"], 110);
+}
+
+#[test]
+fn bulls_vees_and_tapers_on_every_surface() {
+    cutter_locations(
+        &["bull:0.6:0.1", "bull:0.4:0.2", "bull:0.4:0", "vee:60:0.1:0.5", "vee:90:0:0.4", "taper:0.2:10:0.5"],
+        100,
+    );
+}
+
+#[test]
+fn every_kth_row_is_those_rows() {
+    surfaces::all(110).par_iter().for_each(|(name, h)| {
+        for (text, every) in [("ball:0.5", 5), ("ball:0.15", 3), ("flat:0.3", 4), ("bull:0.4:0.1", 7)] {
+            let (profile, twin) = cutter(text, 0.0);
+            let out = reaching_past(h);
+            let got = fast::cutter_location_rows(h, &profile, out, every);
+            let want = naive::cutter_location(h, &twin, out, every as i64);
+            assert_eq!(got.window, want.window);
+            same(&format!("{text} every {every} rows on {name}"), &got.z_mm, &want.z_mm);
+        }
+    });
+}
+
+#[test]
+fn closing_is_the_erosion_of_positions_past_the_edges() {
+    surfaces::all(80).par_iter().for_each(|(name, h)| {
+        for text in ["ball:0.3", "flat:0.3", "bull:0.4:0.1"] {
+            let (profile, twin) = cutter(text, 0.0);
+            let cl = naive::cutter_location(h, &twin, h.window.grown(profile.reach()), 1);
+            let want = naive::erode(&cl, &twin, h.window);
+            let got = fast::closing(h, &profile, h.window);
+            same(&format!("{text} closing {name}"), &got.z_mm, &want.z_mm);
+            let residual = fast::residual(&got, h);
+            for (residual, h) in residual.z_mm.iter().zip(&h.z_mm) {
+                assert!(*residual >= 0.0 || h.is_nan());
+            }
+        }
+    });
+}
+
+#[test]
+fn rows_stand_where_the_controller_can() {
+    surfaces::all(100).par_iter().for_each(|(name, h)| {
+        for (text, allowance_mm) in
+            [("ball:0.5", 0.0), ("flat:0.4", 0.0), ("ball:0.3", 0.0047), ("flat:0.3", 0.007)]
+        {
+            let (profile, twin) = cutter(text, allowance_mm);
+            let targets: Vec<RowTarget> = (0..14)
+                .map(|i| RowTarget {
+                    x0_mm: -0.05 + 0.0025 * (i % 3) as f64,
+                    y_mm: -0.1 + 0.0875 * i as f64,
+                    count: 90 + 3 * i,
+                })
+                .collect();
+            let got = fast::rows(h, &profile, &targets);
+            for (got, target) in got.iter().zip(&targets) {
+                let want = naive::row(h, &twin, *target);
+                same(&format!("{text} + {allowance_mm} along {target:?} of {name}"), got, &want);
+            }
+        }
+    });
+}
+
+#[test]
+fn passes_leave_what_they_leave() {
+    surfaces::all(100).par_iter().for_each(|(name, h)| {
+        for text in ["ball:0.5", "flat:0.3", "bull:0.4:0.1", "vee:60:0.1:0.4"] {
+            let (profile, twin) = cutter(text, 0.0);
+            let targets: Vec<RowTarget> = (0..22)
+                .map(|i| RowTarget {
+                    x0_mm: -0.052 + 0.0025 * (i % 4) as f64,
+                    y_mm: -0.03 + 0.05125 * i as f64,
+                    count: 105,
+                })
+                .collect();
+            let z = fast::rows(h, &profile, &targets);
+            let passes: Vec<RowPass> = targets
+                .iter()
+                .zip(&z)
+                .map(|(t, z_mm)| RowPass { x0_mm: t.x0_mm, y_mm: t.y_mm, z_mm })
+                .collect();
+            let got = fast::machined_by_rows(&passes, &profile, h.window);
+            let want = naive::machined_by_rows(&passes, &twin, h.window);
+            same(&format!("{text} over {name}"), &got.z_mm, &want.z_mm);
+        }
+    });
+}
+
+#[test]
+fn points_are_rows_of_one() {
+    let h = &surfaces::all(60)[1].1;
+    let (profile, _) = cutter("ball:0.3", 0.0);
+    let at: Vec<[f64; 2]> = (0..40).map(|i| [0.013 * i as f64, 0.6 - 0.0111 * i as f64]).collect();
+    for (z, [x_mm, y_mm]) in fast::points(h, &profile, &at).iter().zip(&at) {
+        let row = fast::row(h, &profile, *x_mm, *y_mm, 1)[0] as f64;
+        assert!((z - row).abs() < 1e-7, "{z} {row}");
+    }
+}

@@ -1,0 +1,84 @@
+//! The design against an independent implementation of the paper (tests/cases).
+
+use glam::DVec3;
+use screenmill::screen::{self, Scene, Workspace};
+use serde_json::Value;
+
+fn case(name: &str) -> Value {
+    let path = format!("{}/tests/cases/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).expect("a case file");
+    serde_json::from_str(&text).expect("JSON")
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().expect("a list").iter().map(|v| v.as_f64().expect("a number")).collect()
+}
+
+fn points<const N: usize>(value: &Value) -> Vec<[f64; N]> {
+    let list = value.as_array().expect("a list").iter();
+    list.map(|v| numbers(v).try_into().expect("a point")).collect()
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn scene(name: &str) -> Scene {
+    let path = format!("{}/samples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    Scene::read(path.as_ref()).expect("a sample scene")
+}
+
+fn one_cell_matches(scene: &Scene, case: &Value) {
+    let facets = case["n"].as_u64().expect("a number") as usize;
+    let x = DVec3::from_array(points::<3>(&Value::Array(vec![case["screen_point_m"].clone()]))[0]);
+    let found = screen::directions(&scene.view(x), facets).expect("an audience");
+    assert_eq!(found.density, case["lattice_nu"].as_f64().expect("a number"));
+    let directions = points::<3>(&case["directions"]);
+    assert_eq!(found.list.len(), directions.len());
+    for (o, expected) in found.list.iter().zip(&directions) {
+        assert!(largest_difference(&o.to_array(), expected) < 1e-12, "{o} {expected:?}");
+    }
+    let wanted = screen::facets(scene, x, &found.list).expect("facets");
+    let gradients = points::<2>(&case["gradients"]);
+    for (g, expected) in wanted.gradients.iter().zip(&gradients) {
+        assert!(largest_difference(g, expected) < 1e-12);
+    }
+    let solved =
+        screen::solve(&mut Workspace::default(), &wanted.gradients, &wanted.weights, 4.0, 1e-6).expect("a solution");
+    assert!(largest_difference(&solved.areas_mm2, &numbers(&case["target_proj_mm2"])) < 1e-12);
+    for (a, p) in solved.achieved_mm2.iter().zip(&solved.areas_mm2) {
+        assert!((a / p - 1.0).abs() <= 1e-6);
+    }
+    assert!(largest_difference(&solved.offsets_mm, &numbers(&case["plane_offsets_mm"])) < 1e-6);
+}
+
+#[test]
+fn a_theatre_cell_of_200_facets_is_the_references() {
+    one_cell_matches(&scene("theatre"), &case("theatre-centre-200"));
+}
+
+#[test]
+fn a_home_cell_of_50_facets_is_the_references() {
+    one_cell_matches(&scene("home-theatre"), &case("home-50"));
+}
+
+#[test]
+fn edge_cases_merge_and_solve_as_the_references() {
+    for case in case("edge_cases").as_array().expect("a list") {
+        let (g, p) = (points::<2>(&case["g"]), numbers(&case["p"]));
+        let tag = case["tag"].as_str().expect("a tag");
+        let solved = screen::solve(&mut Workspace::default(), &g, &p, 4.0, 1e-9).expect(tag);
+        assert_eq!(solved.gradients, points::<2>(&case["merged_g"]), "{tag}");
+        assert!(largest_difference(&solved.areas_mm2, &numbers(&case["merged_p"])) < 1e-12, "{tag}");
+        let map: Vec<Option<usize>> = case["map"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .map(|v| usize::try_from(v.as_i64().expect("a number")).ok())
+            .collect();
+        assert_eq!(solved.merged_into, map, "{tag}");
+        assert!(largest_difference(&solved.offsets_mm, &numbers(&case["c"])) < 1e-6, "{tag}");
+        assert!(largest_difference(&solved.achieved_mm2, &numbers(&case["A"])) < 1e-7, "{tag}");
+    }
+}

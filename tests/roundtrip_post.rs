@@ -1,0 +1,242 @@
+//! What is written is read back by a reader of its own, and has to be the toolpath, unit by unit.
+
+use proptest::prelude::*;
+use screenmill::machine::{Library, Machine, Tool};
+use screenmill::post::{self, Dialect, Program, StockFacts, ZZero};
+use screenmill::toolpath::{GridPoint, Kind, Move, Toolpath};
+
+const DIALECTS: [(&str, &str); 3] =
+    [("linuxcnc", "linuxcnc-mill"), ("grbl", "grbl-router"), ("rml1", "roland-egx-600")];
+
+fn text_of(path: &Toolpath, tool: &Tool, dialect: &Dialect, machine: &Machine) -> Vec<u8> {
+    let stock = StockFacts {
+        material: "aluminium".into(),
+        width_mm: 10.0,
+        height_mm: 10.0,
+        thickness_mm: 10.0,
+        top_allowance_mm: 0.2,
+    };
+    let program = Program {
+        path,
+        part: "p",
+        tile: "r0c0",
+        operation: "finish",
+        tool,
+        stock: &stock,
+        z_zero: ZZero::StockTop,
+        wcs: "G55",
+        clearance_mm: 5.0,
+        notes: &[],
+    };
+    let mut text = Vec::new();
+    post::write(&program, dialect, machine, &mut text).expect("written");
+    text
+}
+
+/// A motion as read: where to, and the feed in mm/min (None: rapid).
+#[derive(Debug, PartialEq)]
+struct Read {
+    to: GridPoint,
+    feed: Option<String>,
+}
+
+fn units(text: &str, decimals: usize) -> i32 {
+    let (sign, digits) = text.strip_prefix('-').map_or((1, text), |rest| (-1, rest));
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+    assert!(fraction.len() <= decimals, "{text} is finer than the grid");
+    sign * format!("{whole}{fraction:0<decimals$}").parse::<i32>().expect("digits")
+}
+
+fn read_g_code(text: &str, decimals: usize) -> Vec<Read> {
+    let mut at = [0; 3];
+    let (mut rapid, mut feed) = (true, String::new());
+    let mut motions = Vec::new();
+    for line in text.lines().filter(|line| !line.starts_with('(')) {
+        let mut moved = false;
+        for word in line.split(' ') {
+            let (letter, value) = word.split_at(1);
+            match letter {
+                "X" | "Y" | "Z" => {
+                    at["XYZ".find(letter).expect("one of them")] = units(value, decimals);
+                    moved = true;
+                }
+                "F" => feed = value.into(),
+                "G" if value == "0" => rapid = true,
+                "G" if value == "1" => rapid = false,
+                _ => {}
+            }
+        }
+        if moved {
+            motions.push(Read { to: at, feed: (!rapid).then(|| feed.clone()) });
+        }
+    }
+    motions.remove(0);
+    motions
+}
+
+fn read_rml(text: &str) -> Vec<Read> {
+    let mut feed = String::new();
+    let mut motions: Vec<Read> = Vec::new();
+    for line in text.split("\r\n") {
+        if let Some(speed) = line.strip_prefix('V') {
+            feed = speed.into();
+        } else if let Some(point) = line.strip_prefix('Z') {
+            let words: Vec<i32> = point.split(',').map(|word| word.parse().expect("an integer")).collect();
+            let to = [words[0], words[1], words[2]];
+            if motions.last().is_none_or(|last| last.to != to) {
+                motions.push(Read { to, feed: Some(feed.clone()) });
+            }
+        }
+    }
+    motions
+}
+
+fn path(unit_mm: f64, steps: &[(u8, i32, i32, i32)]) -> Toolpath {
+    let clearance = (5.0 / unit_mm).round() as i32;
+    let mut at = [steps[0].1, steps[0].2, clearance];
+    let mut moves = vec![Move { kind: Kind::Rapid, to: at }];
+    for &(kind, x, y, z) in steps {
+        match kind % 4 {
+            0 => {
+                moves.push(Move { kind: Kind::Rapid, to: [at[0], at[1], clearance] });
+                moves.push(Move { kind: Kind::Rapid, to: [x, y, clearance] });
+                at = [x, y, clearance];
+            }
+            1 => {
+                at[2] = -z.abs();
+                moves.push(Move { kind: Kind::Plunge, to: at });
+            }
+            _ => {
+                at = [x, y, -z.abs()];
+                moves.push(Move { kind: Kind::Cut, to: at });
+            }
+        }
+    }
+    Toolpath { unit_mm, moves, pass_starts: vec![0] }
+}
+
+fn wanted(path: &Toolpath, clearance: i32, feeds: [&str; 4], rapids: bool) -> Vec<Read> {
+    let mut motions: Vec<Read> = Vec::new();
+    let mut moves = path.moves.clone();
+    let last = moves[moves.len() - 1].to;
+    moves.push(Move { kind: Kind::Rapid, to: [last[0], last[1], clearance] });
+    for one in moves {
+        let from = motions.last().map(|m| m.to);
+        if from == Some(one.to) {
+            continue;
+        }
+        let feed = match one.kind {
+            Kind::Cut => Some(feeds[0]),
+            Kind::Plunge => Some(feeds[1]),
+            Kind::Rapid if !rapids => None,
+            Kind::Rapid if from.is_none_or(|from| from[2] != one.to[2]) => Some(feeds[3]),
+            Kind::Rapid => Some(feeds[2]),
+        };
+        motions.push(Read { to: one.to, feed: feed.map(String::from) });
+    }
+    motions
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn every_dialect_says_the_toolpath_and_keeps_its_limits(
+        steps in prop::collection::vec((any::<u8>(), -60_000..60_000i32, -40_000..40_000i32, 0..4_000i32), 1..60)
+    ) {
+        let library = Library::find("tools", None).expect("embedded");
+        let tool = library.tool("ball-1").expect("in it");
+        for (name, machine) in DIALECTS {
+            let dialect = Dialect::find(name, None).expect("embedded");
+            let machine = Machine::find(machine, None).expect("embedded");
+            let path = path(dialect.unit_mm, &steps);
+            let text = text_of(&path, tool, &dialect, &machine);
+            let clearance = (5.0 / dialect.unit_mm).round() as i32;
+            let ending = dialect.line_ending.bytes();
+            prop_assert!(text.ends_with(ending), "the last byte ends a line");
+            let text = String::from_utf8(text).expect("ASCII");
+            let lines: Vec<&str> = text.split(std::str::from_utf8(ending).expect("ASCII")).collect();
+            for line in &lines[..lines.len() - 1] {
+                prop_assert!(!line.is_empty() && line.len() <= dialect.limits.line_max, "{name}: {line}");
+                prop_assert!(line.bytes().all(|b| (b' '..=b'~').contains(&b)), "{name}: {line}");
+                prop_assert!(!line.contains(|c| dialect.limits.forbidden.contains(c)), "{name}: {line}");
+                for word in line.split([' ', ',', ';']) {
+                    prop_assert!(!dialect.limits.missing.iter().any(|m| m == word), "{name}: {line}");
+                }
+            }
+            let (read, want) = match name {
+                "linuxcnc" => (read_g_code(&text, 4), wanted(&path, clearance, ["320", "80", "", ""], false)),
+                "grbl" => (read_g_code(&text, 3), wanted(&path, clearance, ["320", "80", "", ""], false)),
+                _ => (read_rml(&text), wanted(&path, clearance, ["5.3", "1.3", "30.0", "15.0"], true)),
+            };
+            prop_assert_eq!(read, want, "{}", name);
+        }
+    }
+}
+
+#[test]
+fn a_long_program_takes_a_second_at_most_per_million_moves() {
+    let dialect = Dialect::find("linuxcnc", None).expect("embedded");
+    let machine = Machine::find("linuxcnc-mill", None).expect("embedded");
+    let library = Library::find("tools", None).expect("embedded");
+    let tool = library.tool("ball-1").expect("in it");
+    let mut moves = vec![Move { kind: Kind::Rapid, to: [0, 0, 50_000] }];
+    moves.extend(
+        (0..1_000_000).map(|i| Move { kind: Kind::Cut, to: [i * 3, i / 1000 * 500, -(i * 7 % 9973)] }),
+    );
+    let path = Toolpath { unit_mm: dialect.unit_mm, moves, pass_starts: vec![0] };
+    let start = std::time::Instant::now();
+    let text = text_of(&path, tool, &dialect, &machine);
+    let elapsed = start.elapsed();
+    println!("{} bytes in {elapsed:?}", text.len());
+    assert!(text.len() > 10_000_000);
+    // Far above what it takes, so that a busy machine does not fail it; a format! per word would.
+    assert!(elapsed.as_secs_f64() < 5.0, "{elapsed:?}");
+}
+
+/// LinuxCNC's own interpreter accepts what is written and sees the same end points.
+#[test]
+fn linuxcnc_reads_it_as_meant() {
+    let probe = std::process::Command::new("rs274").arg("-v").stdin(std::process::Stdio::null()).output();
+    if probe.is_err() {
+        assert!(std::env::var_os("CI").is_none(), "rs274 of linuxcnc-uspace is needed in CI");
+        println!("skipped: rs274 of linuxcnc-uspace is not installed");
+        return;
+    }
+    let dialect = Dialect::find("linuxcnc", None).expect("embedded");
+    let machine = Machine::find("linuxcnc-mill", None).expect("embedded");
+    let library = Library::find("tools", None).expect("embedded");
+    let steps: Vec<(u8, i32, i32, i32)> = (0..200)
+        .map(|i| ((i as u8).wrapping_mul(7), i * 977 % 50_001, i * 613 % 30_001, i * 37 % 3001))
+        .collect();
+    let path = path(dialect.unit_mm, &steps);
+    let text = text_of(&path, library.tool("ball-1").expect("in it"), &dialect, &machine);
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let file = folder.path().join("p.ngc");
+    std::fs::write(&file, &text).expect("writable");
+    let output = std::process::Command::new("rs274")
+        .arg("-g")
+        .arg(&file)
+        .current_dir(folder.path())
+        .stdin(std::process::Stdio::null())
+        .output()
+        .expect("rs274 runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8_lossy(&output.stderr).trim(), "executing");
+    let canonical = String::from_utf8(output.stdout).expect("text");
+    assert!(canonical.contains("SET_MOTION_CONTROL_MODE(CANON_CONTINUOUS, 0.001000)"), "{canonical}");
+    assert!(canonical.contains("START_SPINDLE_CLOCKWISE") && canonical.contains("DWELL(3.0000)"));
+    assert!(canonical.contains("PROGRAM_END()"));
+    let ends: Vec<GridPoint> = canonical
+        .lines()
+        .filter(|line| line.contains("STRAIGHT_"))
+        .map(|line| {
+            let inside = &line[line.find('(').expect("arguments") + 1..];
+            let words: Vec<i32> = inside.split(", ").take(3).map(|word| units(word, 4)).collect();
+            [words[0], words[1], words[2]]
+        })
+        .collect();
+    // rs274 -g has the origin of its G55 at zero, and the lift of the start block comes first.
+    let want: Vec<GridPoint> =
+        wanted(&path, 50_000, ["", "", "", ""], false).into_iter().map(|read| read.to).collect();
+    assert_eq!(ends[1..], want);
+}
