@@ -3,6 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use rayon::prelude::*;
+
 use super::Error;
 use super::outline::{Outline, Shape};
 use super::tally::{SUM_UNITS_PER_MM, covers, part_of_row, to_sum};
@@ -465,7 +467,10 @@ impl Cavities {
         let step_mm = self.params.step_mm;
         let kept = self.kept.into_sorted_vec();
         Found {
-            cavities: kept.into_iter().map(|Reverse(Ranked(region))| region.finish(&self.params)).collect(),
+            cavities: kept
+                .into_par_iter()
+                .map(|Reverse(Ranked(region))| region.finish(&self.params))
+                .collect(),
             count: self.count,
             area_mm2: self.samples as f64 * step_mm * step_mm,
             volume_mm3: volume_mm3(self.volume, step_mm),

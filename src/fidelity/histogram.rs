@@ -20,7 +20,8 @@ pub struct Histogram {
 impl Histogram {
     /// Counts a value given in quanta, rounded to the nearest; negative and NaN count as 0.
     pub fn add(&mut self, quanta: f64) {
-        let bin = bin_of((quanta + 0.5) as u64);
+        // By way of i64: plain x86-64 has no conversion to unsigned.
+        let bin = bin_of((quanta + 0.5).max(0.0) as i64 as u64);
         let page = bin / PAGE;
         if page >= self.pages.len() {
             self.pages.resize(page + 1, None);

@@ -29,6 +29,9 @@ pub(super) enum Shape {
     Hull(Vec<(i32, i32)>),
 }
 
+/// From one corner of the samples' grid to another.
+type Edge = ((i32, i32), (i32, i32));
+
 /// Regions below this many samples keep every corner.
 const FEW: usize = 16;
 
@@ -89,9 +92,9 @@ impl Shape {
     }
 }
 
-fn trace(mut runs: Vec<Run>) -> MultiPolygon<f64> {
+/// Sorted runs, those cut by a block's side whole again, so that blocks leave no trace.
+fn merged(mut runs: Vec<Run>) -> Vec<Run> {
     runs.sort_unstable();
-    // A run cut by a block's side is one run again, so that blocks leave no trace.
     runs.dedup_by(|right, left| {
         let joins = right.row == left.row && right.start == left.end;
         if joins {
@@ -99,7 +102,90 @@ fn trace(mut runs: Vec<Run>) -> MultiPolygon<f64> {
         }
         joins
     });
+    runs
+}
+
+fn trace(runs: Vec<Run>) -> MultiPolygon<f64> {
+    let runs = merged(runs);
     let samples: usize = runs.iter().map(|run| (run.end - run.start) as usize).sum();
+    let whole = match boundary(&runs) {
+        Some(rings) => MultiPolygon(vec![rings]),
+        None => united(&runs),
+    };
+    if samples < FEW { whole } else { whole.simplify_vw_preserve(0.6) }
+}
+
+/// Follows the samples' edges, region on the left; `None` where rings touch each other at a corner. Runs are
+/// those of [`merged`].
+fn boundary(runs: &[Run]) -> Option<Polygon<f64>> {
+    let mut edges: Vec<Edge> = Vec::new();
+    let mut below: &[Run] = &[];
+    for row in runs.chunk_by(|a, b| a.row == b.row) {
+        let y = row[0].row;
+        let adjoining = below.first().is_some_and(|run| run.row + 1 == y);
+        if !adjoining {
+            level(below, &[], below.first().map_or(y, |run| run.row + 1), &mut edges);
+        }
+        level(if adjoining { below } else { &[] }, row, y, &mut edges);
+        for run in row {
+            edges.push(((run.end, y), (run.end, y + 1)));
+            edges.push(((run.start, y + 1), (run.start, y)));
+        }
+        below = row;
+    }
+    level(below, &[], below.first()?.row + 1, &mut edges);
+    edges.sort_unstable();
+    if edges.windows(2).any(|pair| pair[0].0 == pair[1].0) {
+        return None;
+    }
+    let mut followed = vec![false; edges.len()];
+    let (mut exterior, mut interiors) = (None, Vec::new());
+    for first in 0..edges.len() {
+        let (mut at, mut ring) = (first, Vec::new());
+        while !std::mem::replace(&mut followed[at], true) {
+            ring.push(edges[at].0);
+            at = edges.binary_search_by_key(&edges[at].1, |edge| edge.0).ok()?;
+        }
+        if ring.is_empty() {
+            continue;
+        }
+        let corner = |i: usize| {
+            let (a, b, c) = (ring[(i + ring.len() - 1) % ring.len()], ring[i], ring[(i + 1) % ring.len()]);
+            (a.0 != b.0 || b.0 != c.0) && (a.1 != b.1 || b.1 != c.1)
+        };
+        let corners = (0..ring.len()).filter(|&i| corner(i)).map(|i| ring[i]);
+        let line: LineString<f64> =
+            corners.map(|(x, y)| Coord { x: f64::from(x), y: f64::from(y) }).collect();
+        // Edges are sorted, so the first ring starts at the leftmost corner: it is the outer one.
+        if exterior.is_none() { exterior = Some(line) } else { interiors.push(line) }
+    }
+    Some(Polygon::new(exterior?, interiors))
+}
+
+/// Edges along y between the runs of the row below and of the row above.
+fn level(below: &[Run], above: &[Run], y: i32, edges: &mut Vec<Edge>) {
+    let mut ends: Vec<(i32, bool)> = Vec::with_capacity(2 * (below.len() + above.len()));
+    ends.extend(below.iter().flat_map(|run| [(run.start, false), (run.end, false)]));
+    ends.extend(above.iter().flat_map(|run| [(run.start, true), (run.end, true)]));
+    ends.sort_unstable();
+    let (mut under, mut over, mut from) = (false, false, 0);
+    for (x, of_above) in ends {
+        if x > from && over && !under {
+            edges.push(((from, y), (x, y)));
+        } else if x > from && under && !over {
+            edges.push(((x, y), (from, y)));
+        }
+        if of_above {
+            over = !over
+        } else {
+            under = !under
+        }
+        from = x;
+    }
+}
+
+/// The union of the runs, for regions that hang together or close a ring by corners.
+fn united(runs: &[Run]) -> MultiPolygon<f64> {
     let rectangles: Vec<Polygon<f64>> = runs
         .iter()
         .map(|run| {
@@ -107,8 +193,7 @@ fn trace(mut runs: Vec<Run>) -> MultiPolygon<f64> {
             Rect::new(Coord { x: start, y: row }, Coord { x: end, y: row + 1.0 }).to_polygon()
         })
         .collect();
-    let whole = unary_union(&rectangles).map_coords(|Coord { x, y }| Coord { x: x.round(), y: y.round() });
-    if samples < FEW { whole } else { whole.simplify_vw_preserve(0.6) }
+    unary_union(&rectangles).map_coords(|Coord { x, y }| Coord { x: x.round(), y: y.round() })
 }
 
 /// Andrew's monotone chain in whole numbers: exact, no three corners on a line.
@@ -134,4 +219,42 @@ fn convex_hull(mut points: Vec<(i32, i32)>) -> Vec<(i32, i32)> {
     let mut hull = chain(&mut points.iter().copied());
     hull.extend(chain(&mut points.iter().rev().copied()));
     hull
+}
+
+#[cfg(test)]
+mod tests {
+    use geo::{Area, Validation};
+
+    use super::*;
+
+    fn runs(picture: &[&str]) -> Vec<Run> {
+        let samples = picture.iter().enumerate().flat_map(|(row, line)| {
+            let filled = line.char_indices().filter(|&(_, sample)| sample == '#');
+            filled.map(move |(column, _)| Run {
+                row: row as i32,
+                start: column as i32,
+                end: column as i32 + 1,
+            })
+        });
+        samples.collect()
+    }
+
+    #[test]
+    fn both_ways_of_tracing_enclose_the_samples() {
+        let ring = ["####", "#..#", "#.##", "###."];
+        let gap = ["##..##", "##..##", "######", ".#....", "......"];
+        for (picture, samples, holes, direct) in [
+            (&ring[..], 12, 1, true),
+            (&gap[..], 15, 0, true),
+            (&["##..", "..##"][..], 4, 0, false),
+            (&["###", "#.#", "##.", "..#"][..], 8, 1, false),
+        ] {
+            let runs = runs(picture);
+            assert_eq!(boundary(&merged(runs.clone())).is_some(), direct, "{picture:?}");
+            let outline = trace(runs);
+            assert!(outline.is_valid(), "{picture:?}");
+            assert_eq!(outline.unsigned_area(), f64::from(samples), "{picture:?}");
+            assert_eq!(outline.0.iter().map(|polygon| polygon.interiors().len()).sum::<usize>(), holes);
+        }
+    }
 }

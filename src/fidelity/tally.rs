@@ -1,6 +1,7 @@
 //! Deviation of the machined surface from the design, counted block by block.
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_4, PI};
+use std::ops::Range;
 
 use super::histogram::Histogram;
 use crate::grid::{Heights, Window};
@@ -158,9 +159,10 @@ impl Tally {
         layers.passes.map_or(Ok(()), |passes| covers("passes", passes, block))?;
         self.has_cavity |= layers.cavity.is_some();
         self.has_passes |= layers.passes.is_some();
+        let mut keys = vec![0.0; block.columns];
         for row in block.row..block.row_end() {
             self.add_row(block, row, &layers);
-            self.add_normals(block, row, layers.design, layers.machined);
+            self.add_normals(block, row, layers.design, layers.machined, &mut keys);
         }
         Ok(())
     }
@@ -170,6 +172,8 @@ impl Tally {
         let machined = part_of_row(layers.machined, block, row);
         let cavity = layers.cavity.map(|heights| part_of_row(heights, block, row));
         let passes = layers.passes.map(|heights| part_of_row(heights, block, row));
+        let [mut gouge_mm, mut excess_mm] =
+            [self.gouge, self.excess].map(|place| place.map_or(0.0, |place| place.mm));
         for i in 0..block.columns {
             let cavity_mm = cavity.map_or(0.0, |cavity| f64::from(cavity[i]));
             if cavity.is_some() && cavity_mm.is_finite() {
@@ -188,11 +192,13 @@ impl Tally {
             self.deviation_sum += i128::from(sum);
             self.deviation.add(deviation_mm.abs() / DEVIATION_QUANTUM_MM);
             self.within += u64::from(self.params.limit_mm.is_some_and(|limit| deviation_mm.abs() <= limit));
-            let place = Place { mm: deviation_mm.abs(), column: block.column + i as i64, row };
-            if deviation_mm < 0.0 && self.gouge.is_none_or(|gouge| place.mm >= gouge.mm) {
-                self.gouge = Place::larger(self.gouge, Some(place));
-            } else if deviation_mm > 0.0 && self.excess.is_none_or(|excess| place.mm >= excess.mm) {
-                self.excess = Place::larger(self.excess, Some(place));
+            if deviation_mm <= -gouge_mm || deviation_mm >= excess_mm {
+                self.extreme(
+                    Place { mm: deviation_mm.abs(), column: block.column + i as i64, row },
+                    deviation_mm,
+                );
+                [gouge_mm, excess_mm] =
+                    [self.gouge, self.excess].map(|place| place.map_or(0.0, |place| place.mm));
             }
             let rounding_mm = passes.map_or(0.0, |passes| machined_mm - f64::from(passes[i]));
             if cavity_mm.is_finite() && rounding_mm.is_finite() {
@@ -206,25 +212,41 @@ impl Tally {
         }
     }
 
-    fn add_normals(&mut self, block: Window, row: i64, design: &Heights, machined: &Heights) {
+    fn extreme(&mut self, place: Place, deviation_mm: f64) {
+        if deviation_mm < 0.0 {
+            self.gouge = Place::larger(self.gouge, Some(place));
+        } else if deviation_mm > 0.0 {
+            self.excess = Place::larger(self.excess, Some(place));
+        }
+    }
+
+    fn add_normals(
+        &mut self,
+        block: Window,
+        row: i64,
+        design: &Heights,
+        machined: &Heights,
+        keys: &mut [f64],
+    ) {
         let (Some(design), Some(machined)) =
             (Stencil::at(design, block, row), Stencil::at(machined, block, row))
         else {
             return;
         };
-        for i in 0..block.columns {
-            if !(design.centre(i) - machined.centre(i)).is_finite() {
-                continue;
+        let per_step = 1.0 / self.params.step_mm;
+        keys.fill(f64::NAN);
+        if let (Some(a), Some(b)) = (design.surrounded(block.columns), machined.surrounded(block.columns)) {
+            let inner = a.start.max(b.start)..a.end.min(b.end);
+            if inner.start < inner.end {
+                let (design, machined) = (design.five(inner.clone()), machined.five(inner.clone()));
+                angle_keys(design, machined, 0.5 * per_step, &mut keys[inner]);
             }
-            let design_around = design.around(i);
-            let machined_around = machined.around(i);
-            let slope = |low: usize| {
-                let a = difference(&design_around, &machined_around, low, design.centre(i))?;
-                let b = difference(&machined_around, &design_around, low, machined.centre(i))?;
-                Some((a / self.params.step_mm, b / self.params.step_mm))
-            };
-            if let (Some((ax, bx)), Some((ay, by))) = (slope(0), slope(2)) {
-                self.normals.add(angle_key([ax, ay], [bx, by]));
+        }
+        for (i, &key) in keys.iter().enumerate() {
+            if (0.0..KEY_OF_45_DEG).contains(&key) {
+                self.normals.add(key);
+            } else if let Some(key) = careful_key(&design, &machined, i, per_step) {
+                self.normals.add(key);
             }
         }
     }
@@ -285,7 +307,9 @@ impl Tally {
 
 /// Rounded to the sums' unit; differences of real surfaces are far below the 8 km at which this saturates.
 pub(super) fn to_sum(mm: f64) -> i64 {
-    (mm * SUM_UNITS_PER_MM).round() as i64
+    let units = mm * SUM_UNITS_PER_MM;
+    // f64::round is a call on plain x86-64, and this runs three times a sample.
+    (units + 0.5f64.copysign(units)) as i64
 }
 
 pub(super) fn covers(layer: &'static str, heights: &Heights, block: Window) -> Result<(), super::Error> {
@@ -323,6 +347,25 @@ impl<'a> Stencil<'a> {
         self.sample(1, Some(self.offset + i))
     }
 
+    /// The samples, of `columns` to be judged, that have columns on both sides and rows below and above.
+    fn surrounded(&self, columns: usize) -> Option<Range<usize>> {
+        let width = self.rows[0].and(self.rows[2]).and(self.rows[1])?.len();
+        Some(usize::from(self.offset == 0)..columns.min(width - 1 - self.offset))
+    }
+
+    /// Left, right, below, above and centre of surrounded samples, as rows.
+    fn five(&self, inner: Range<usize>) -> [&'a [f32]; 5] {
+        let [below, centre, above] = self.rows.map(Option::unwrap_or_default);
+        let (start, end) = (self.offset + inner.start, self.offset + inner.end);
+        [
+            &centre[start - 1..end - 1],
+            &centre[start + 1..end + 1],
+            &below[start..end],
+            &above[start..end],
+            &centre[start..end],
+        ]
+    }
+
     /// Left, right, below, above; NaN where there is none.
     fn around(&self, i: usize) -> [f64; 4] {
         let column = self.offset + i;
@@ -346,18 +389,53 @@ fn difference(mine: &[f64; 4], theirs: &[f64; 4], low: usize, centre: f64) -> Op
     }
 }
 
-/// A figure that grows with the angle between two normals and needs no arc tangent below 45 degrees: the
-/// tangent there, 1 plus the rest of the angle above, in quanta.
-fn angle_key([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
-    let (u, v, w) = (ax - bx, ay - by, ax * by - ay * bx);
-    let cross = (u * u + v * v + w * w).sqrt();
-    let dot = ax * bx + ay * by + 1.0;
+/// The angle between the normals of one sample where a neighbour is missing or the angle large; `None` where
+/// there is none.
+fn careful_key(design: &Stencil, machined: &Stencil, i: usize, per_step: f64) -> Option<f64> {
+    if !(design.centre(i) - machined.centre(i)).is_finite() {
+        return None;
+    }
+    let (design_around, machined_around) = (design.around(i), machined.around(i));
+    let slopes = |low: usize| {
+        let a = difference(&design_around, &machined_around, low, design.centre(i))?;
+        let b = difference(&machined_around, &design_around, low, machined.centre(i))?;
+        Some((a * per_step, b * per_step))
+    };
+    let ((ax, bx), (ay, by)) = (slopes(0)?, slopes(2)?);
+    let (cross, dot) = cross_and_dot([ax, ay], [bx, by]);
     let key = if cross < dot { cross / dot } else { 1.0 + (cross.atan2(dot) - FRAC_PI_4) };
-    key / ANGLE_QUANTUM_DEG.to_radians()
+    Some(key * KEY_OF_45_DEG)
 }
 
-/// The angle in degrees of an [`angle_key`].
+/// [`careful_key`] of surrounded samples with angles below 45 degrees, in one sweep the compiler can vectorise;
+/// NaN, infinite, negative or at least [`KEY_OF_45_DEG`] for the others.
+fn angle_keys(design: [&[f32]; 5], machined: [&[f32]; 5], per_rise: f64, keys: &mut [f64]) {
+    let count = keys.len();
+    let [dl, dr, db, da, dc] = design.map(|row| &row[..count]);
+    let [ml, mr, mb, ma, mc] = machined.map(|row| &row[..count]);
+    for i in 0..count {
+        let slope = |low: f32, high: f32| (f64::from(high) - f64::from(low)) * per_rise;
+        let a = [slope(dl[i], dr[i]), slope(db[i], da[i])];
+        let b = [slope(ml[i], mr[i]), slope(mb[i], ma[i])];
+        let (cross, dot) = cross_and_dot(a, b);
+        // NaN where the sample itself has no data.
+        let held = 0.0 * (f64::from(dc[i]) - f64::from(mc[i]));
+        keys[i] = cross / dot * KEY_OF_45_DEG + held;
+    }
+}
+
+/// Of the normals (-ax, -ay, 1) and (-bx, -by, 1).
+fn cross_and_dot([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> (f64, f64) {
+    let (u, v, w) = (ax - bx, ay - by, ax * by - ay * bx);
+    ((u * u + v * v + w * w).sqrt(), ax * bx + ay * by + 1.0)
+}
+
+/// Below 45 degrees a key is the tangent in units of the angle's quantum, which needs no arc tangent; above, it
+/// grows by the rest of the angle.
+const KEY_OF_45_DEG: f64 = 1.0 / (ANGLE_QUANTUM_DEG * (PI / 180.0));
+
+/// The angle in degrees of a key.
 fn angle_of_key(quanta: f64) -> f64 {
-    let key = quanta * ANGLE_QUANTUM_DEG.to_radians();
+    let key = quanta / KEY_OF_45_DEG;
     if key < 1.0 { key.atan().to_degrees() } else { (FRAC_PI_4 + key - 1.0).to_degrees() }
 }
