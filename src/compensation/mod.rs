@@ -19,6 +19,7 @@ mod ball;
 mod brute;
 mod chord;
 mod contact;
+mod drop;
 mod field;
 mod lanes;
 mod pairs;
@@ -29,6 +30,7 @@ mod stencil;
 mod stream;
 mod tiles;
 
+pub use drop::lift;
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows};
 pub use profile::Profile;
 pub use stream::{Band, stream};
@@ -59,8 +61,4 @@ pub enum Error {
     Infinite { column: i64, row: i64, z_mm: f32 },
     #[error("none of the {samples} samples has data")]
     NoData { samples: usize },
-    #[error(
-        "positions on samples fall below the true drop on a {source_kind}, by up to some um at its steps and ridges; hint: --sampled says that this is meant"
-    )]
-    NotExact { source_kind: &'static str },
 }

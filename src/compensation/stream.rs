@@ -19,17 +19,18 @@ pub struct Band {
 
 /// Compensates a whole part band by band, from the lowest row up. Rows 0, `every`, 2 `every`, ...
 /// are cut, and those beyond the part, whose edges are open; closing is made from these rows.
-/// `read` gives the part's samples in a window that may reach past it. What comes out does not
-/// depend on the bands.
+/// `read` gives the part's samples in a window that may reach past it; `lift` may raise the
+/// locations it is given, as [`super::lift`] does. What comes out does not depend on the bands.
 ///
 /// # Errors
-/// Those of `read` and `each`.
+/// Those of `read`, `lift` and `each`.
 pub fn stream<E>(
     lattice: &Lattice,
     profile: &Profile,
     every: usize,
     with_closing: bool,
     mut read: impl FnMut(Window) -> Result<Heights, E>,
+    mut lift: impl FnMut(&mut Heights) -> Result<(), E>,
     mut each: impl FnMut(Band) -> Result<(), E>,
 ) -> Result<(), E> {
     let every = every.max(1);
@@ -55,7 +56,8 @@ pub fn stream<E>(
         let low = around.row.min(band.row);
         let high = around.row_end().max(band.row_end());
         let h = read(Window { row: low, rows: (high - low) as usize, ..around })?;
-        let more = cutter_location_rows(&h, profile, wanted, every);
+        let mut more = cutter_location_rows(&h, profile, wanted, every);
+        lift(&mut more)?;
         cut.z_mm.extend_from_slice(&more.z_mm);
         cut.window.rows += more.window.rows;
         drop(more);
