@@ -1,6 +1,6 @@
 //! Bad input to `compensate`: exit 2, one message, no file under a final name. A case is a file in
-//! tests/refuse/compensation: the message after `error: `, then `args:` and maybe `part.npy:` with
-//! the rows of a part of 10 um samples, lowest first.
+//! tests/refuse/compensation: the message after `error: `, then `args:` and `part.npy:` with the
+//! rows of a part, lowest first, or `part.stl:` with its lines.
 
 use std::fs;
 use std::path::Path;
@@ -40,6 +40,9 @@ fn every_case_is_refused_as_its_file_says() {
             match line.split_once(": ") {
                 Some(("args", words)) => {
                     arguments = words.split_whitespace().map(|word| word.replace("{dir}", &dir)).collect();
+                }
+                Some((file, lines)) if file.ends_with(".stl") => {
+                    fs::write(scratch.path().join(file), lines.replace("; ", "\n")).expect("a scratch file");
                 }
                 Some((file, rows)) => write_part(&scratch.path().join(file), rows),
                 None => panic!("{name}: {line}"),

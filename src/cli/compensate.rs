@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
             Ok(())
         },
         |band| {
-            found.see(&band)?;
+            found.see(&band);
             progress.inc(band.heights.window.rows as u64);
             files.write(&band)
         },
@@ -131,24 +131,12 @@ struct Found {
 }
 
 impl Found {
-    fn see(&mut self, band: &Band) -> Result<(), compensation::Error> {
-        let window = band.heights.window;
-        for (i, &z_mm) in band.heights.z_mm.iter().enumerate() {
-            if z_mm.is_infinite() {
-                let column = (i % window.columns) as i64;
-                return Err(compensation::Error::Infinite {
-                    column,
-                    row: window.row + (i / window.columns) as i64,
-                    z_mm,
-                });
-            }
-            self.samples += u64::from(!z_mm.is_nan());
-        }
+    fn see(&mut self, band: &Band) {
+        self.samples += band.heights.z_mm.iter().filter(|z_mm| !z_mm.is_nan()).count() as u64;
         for &residual_mm in band.residual.iter().flat_map(|residual| &residual.z_mm) {
             self.residual_max_mm = self.residual_max_mm.max(residual_mm);
             self.cavity_samples += u64::from(residual_mm > CAVITY_MM);
         }
-        Ok(())
     }
 }
 

@@ -57,8 +57,8 @@ pub enum Error {
         "every {every} rows of {step_mm} mm leave strips that cutter {cutter} with a radius of {radius_mm} mm does not touch; hint: --every {most} at most"
     )]
     Strips { every: usize, step_mm: f64, cutter: String, radius_mm: f64, most: usize },
-    #[error("the height at column {column}, row {row} is {z_mm}; hint: NaN stands for no data")]
-    Infinite { column: i64, row: i64, z_mm: f32 },
-    #[error("none of the {samples} samples has data")]
+    #[error(
+        "none of the {samples} samples has data; hint: a finer --step-mm, or is the part seen from its side?"
+    )]
     NoData { samples: usize },
 }
