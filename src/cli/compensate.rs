@@ -48,15 +48,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let Opened { surface, kind, notes } = open(&arguments.part.part, &arguments.part.options())?;
     let lattice = surface.lattice();
     let profile = Profile::new(arguments.cutter, lattice.step_mm, 0.0)?;
-    match kind {
-        Kind::Design if !arguments.sampled => {
-            return Err(compensation::Error::NotExact { source_kind: "design" }.into());
-        }
-        Kind::Mesh if !arguments.sampled => {
-            return Err(compensation::Error::NotExact { source_kind: "mesh" }.into());
-        }
-        _ => {}
-    }
+    let exact = kind != Kind::Heights && !arguments.sampled;
     let with_closing = arguments.closing.is_some() || arguments.residual.is_some() || arguments.cl.is_none();
     if with_closing {
         profile.covers_between(every)?;
@@ -73,8 +65,20 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         every,
         with_closing,
         |window| Ok::<_, Refusal>(surface.heights(window, 0.0)?),
+        |cl| {
+            if exact && cl.window.rows > 0 {
+                let reach_mm = profile.radius_mm();
+                let last = cl.window.row + ((cl.window.rows - 1) * every) as i64;
+                let low_mm =
+                    [lattice.x_mm(cl.window.column) - reach_mm, lattice.y_mm(cl.window.row) - reach_mm];
+                let high_mm =
+                    [lattice.x_mm(cl.window.column_end()) + reach_mm, lattice.y_mm(last) + reach_mm];
+                compensation::lift(cl, every, &profile, &surface.outlines(low_mm, high_mm));
+            }
+            Ok(())
+        },
         |band| {
-            found.see(&band)?;
+            found.see(&band);
             progress.inc(band.heights.window.rows as u64);
             files.write(&band)
         },
@@ -94,7 +98,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     if common.json {
         let report = json!({
             "files": names, "cutter": cutter, "columns": columns, "rows": rows, "step_mm": step_mm,
-            "every": every, "no_data": lattice.window().samples() as u64 - found.samples,
+            "every": every, "exact": exact, "no_data": lattice.window().samples() as u64 - found.samples,
             "residual": residual.map(|(max_mm, area_mm2, fraction)| json!({
                 "max_mm": max_mm, "cavity_area_mm2": area_mm2, "cavity_area_fraction": fraction,
             })),
@@ -102,7 +106,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         });
         println!("{report}");
     } else {
-        println!("{columns} x {rows} samples at {step_mm} mm under {cutter}, every {every} rows");
+        let on = if exact { "its faces" } else { "its samples" };
+        println!("{columns} x {rows} samples at {step_mm} mm under {cutter} on {on}, every {every} rows");
         for name in &names {
             println!("{name}");
         }
@@ -126,24 +131,12 @@ struct Found {
 }
 
 impl Found {
-    fn see(&mut self, band: &Band) -> Result<(), compensation::Error> {
-        let window = band.heights.window;
-        for (i, &z_mm) in band.heights.z_mm.iter().enumerate() {
-            if z_mm.is_infinite() {
-                let column = (i % window.columns) as i64;
-                return Err(compensation::Error::Infinite {
-                    column,
-                    row: window.row + (i / window.columns) as i64,
-                    z_mm,
-                });
-            }
-            self.samples += u64::from(!z_mm.is_nan());
-        }
+    fn see(&mut self, band: &Band) {
+        self.samples += band.heights.z_mm.iter().filter(|z_mm| !z_mm.is_nan()).count() as u64;
         for &residual_mm in band.residual.iter().flat_map(|residual| &residual.z_mm) {
             self.residual_max_mm = self.residual_max_mm.max(residual_mm);
             self.cavity_samples += u64::from(residual_mm > CAVITY_MM);
         }
-        Ok(())
     }
 }
 

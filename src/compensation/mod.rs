@@ -19,6 +19,7 @@ mod ball;
 mod brute;
 mod chord;
 mod contact;
+mod drop;
 mod field;
 mod lanes;
 mod pairs;
@@ -29,6 +30,7 @@ mod stencil;
 mod stream;
 mod tiles;
 
+pub use drop::lift;
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows};
 pub use profile::Profile;
 pub use stream::{Band, stream};
@@ -55,12 +57,8 @@ pub enum Error {
         "every {every} rows of {step_mm} mm leave strips that cutter {cutter} with a radius of {radius_mm} mm does not touch; hint: --every {most} at most"
     )]
     Strips { every: usize, step_mm: f64, cutter: String, radius_mm: f64, most: usize },
-    #[error("the height at column {column}, row {row} is {z_mm}; hint: NaN stands for no data")]
-    Infinite { column: i64, row: i64, z_mm: f32 },
-    #[error("none of the {samples} samples has data")]
-    NoData { samples: usize },
     #[error(
-        "positions on samples fall below the true drop on a {source_kind}, by up to some um at its steps and ridges; hint: --sampled says that this is meant"
+        "none of the {samples} samples has data; hint: a finer --step-mm, or is the part seen from its side?"
     )]
-    NotExact { source_kind: &'static str },
+    NoData { samples: usize },
 }

@@ -19,24 +19,40 @@ pub struct Band {
 
 /// Compensates a whole part band by band, from the lowest row up. Rows 0, `every`, 2 `every`, ...
 /// are cut, and those beyond the part, whose edges are open; closing is made from these rows.
-/// `read` gives the part's samples in a window that may reach past it. What comes out does not
-/// depend on the bands.
+/// `read` gives the part's samples in a window that may reach past it; `lift` may raise the
+/// locations it is given, as [`super::lift`] does. What comes out does not depend on the bands.
 ///
 /// # Errors
-/// Those of `read` and `each`.
+/// Those of `read`, `lift` and `each`.
 pub fn stream<E>(
     lattice: &Lattice,
     profile: &Profile,
     every: usize,
     with_closing: bool,
+    read: impl FnMut(Window) -> Result<Heights, E>,
+    lift: impl FnMut(&mut Heights) -> Result<(), E>,
+    each: impl FnMut(Band) -> Result<(), E>,
+) -> Result<(), E> {
+    let rows_at_once = (BAND_SAMPLES / lattice.columns.max(1)).clamp(64, 1024);
+    by_rows(rows_at_once, lattice, profile, every, with_closing, read, lift, each)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn by_rows<E>(
+    rows_at_once: usize,
+    lattice: &Lattice,
+    profile: &Profile,
+    every: usize,
+    with_closing: bool,
     mut read: impl FnMut(Window) -> Result<Heights, E>,
+    mut lift: impl FnMut(&mut Heights) -> Result<(), E>,
     mut each: impl FnMut(Band) -> Result<(), E>,
 ) -> Result<(), E> {
     let every = every.max(1);
     let reach = profile.reach();
     let part = lattice.window();
     let halo = if with_closing { reach } else { 0 };
-    let rows_at_once = (BAND_SAMPLES / part.columns.max(1)).clamp(64, 1024).next_multiple_of(every);
+    let rows_at_once = rows_at_once.next_multiple_of(every);
     // Rows of positions that are held, one in `every`, and the part's row of the first.
     let mut cut = Heights::empty(Window { columns: part.columns + 2 * halo, rows: 0, ..part.grown(halo) });
     let mut first = -((halo / every * every) as i64);
@@ -55,7 +71,8 @@ pub fn stream<E>(
         let low = around.row.min(band.row);
         let high = around.row_end().max(band.row_end());
         let h = read(Window { row: low, rows: (high - low) as usize, ..around })?;
-        let more = cutter_location_rows(&h, profile, wanted, every);
+        let mut more = cutter_location_rows(&h, profile, wanted, every);
+        lift(&mut more)?;
         cut.z_mm.extend_from_slice(&more.z_mm);
         cut.window.rows += more.window.rows;
         drop(more);
@@ -119,6 +136,87 @@ fn mask(z_mm: &mut [f32], part: &[f32]) {
     for (z_mm, part) in z_mm.iter_mut().zip(part) {
         if part.is_nan() {
             *z_mm = f32::NAN;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compensation::{closing, cutter_location};
+    use std::convert::Infallible;
+
+    /// Waves with a hole.
+    fn part() -> (Lattice, Heights) {
+        let lattice = Lattice::covering(0.83, 1.57, 0.01);
+        let mut h = Heights::empty(lattice.window());
+        for (i, z_mm) in h.z_mm.iter_mut().enumerate() {
+            let (x, y) = ((i % lattice.columns) as f32, (i / lattice.columns) as f32);
+            if (x - 40.0).hypot(y - 70.0) > 9.0 {
+                *z_mm = 0.1 * (0.11 * x).sin() * (0.07 * y + 0.02 * x).cos();
+            }
+        }
+        (lattice, h)
+    }
+
+    /// Bits of every band put together: locations, closing, residual.
+    fn streamed(rows_at_once: usize, every: usize) -> [Vec<u32>; 3] {
+        let (lattice, h) = part();
+        let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
+        let mut out = [Vec::new(), Vec::new(), Vec::new()];
+        let each = |band: Band| {
+            let parts = [Some(&band.cl), band.closing.as_ref(), band.residual.as_ref()];
+            for (out, heights) in out.iter_mut().zip(parts) {
+                out.extend(heights.expect("asked for").z_mm.iter().map(|z| z.to_bits()));
+            }
+            Ok::<(), Infallible>(())
+        };
+        let done =
+            by_rows(rows_at_once, &lattice, &profile, every, true, |w| Ok(h.crop(w)), |_| Ok(()), each);
+        assert!(done.is_ok());
+        out
+    }
+
+    #[test]
+    fn the_height_of_a_band_does_not_show() {
+        for every in [1, 4] {
+            let whole = streamed(1000, every);
+            for rows_at_once in [1, 13, 40] {
+                assert_eq!(streamed(rows_at_once, every), whole, "bands of {rows_at_once}, every {every}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_stream_is_the_whole_with_holes_left_out() {
+        let (_, h) = part();
+        let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
+        let [cl, closed, _] = streamed(17, 1);
+        let whole = [cutter_location(&h, &profile, h.window), closing(&h, &profile, h.window)];
+        for (streamed, whole) in [cl, closed].iter().zip(&whole) {
+            for ((streamed, whole), h) in streamed.iter().zip(&whole.z_mm).zip(&h.z_mm) {
+                let want = if h.is_nan() { f32::NAN } else { *whole };
+                assert!(*streamed == want.to_bits() || want.is_nan() && f32::from_bits(*streamed).is_nan());
+            }
+        }
+    }
+
+    #[test]
+    fn every_kth_row_cuts_past_open_edges_too() {
+        let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
+        let (lattice, h) = part();
+        let [_, closed, _] = streamed(1000, 4);
+        let around = h.window.grown(profile.reach());
+        let mut cl = cutter_location(&h, &profile, around);
+        for (i, z_mm) in cl.z_mm.iter_mut().enumerate() {
+            if (around.row + (i / around.columns) as i64).rem_euclid(4) != 0 {
+                *z_mm = f32::NAN;
+            }
+        }
+        let want = erode(&cl, &profile, h.window);
+        assert_eq!(closed.len(), lattice.window().samples());
+        for ((closed, want), h) in closed.iter().zip(&want.z_mm).zip(&h.z_mm) {
+            assert!(h.is_nan() || *closed == want.to_bits());
         }
     }
 }

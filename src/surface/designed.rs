@@ -463,6 +463,24 @@ impl Surface for Designed {
         self.top_mm
     }
 
+    fn outlines(&self, low_mm: [f64; 2], high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
+        let half_mm = 0.5 * self.design.cell_mm;
+        let mut outlines = Vec::new();
+        for row in self.material.r0..self.material.r1 {
+            for column in self.material.c0..self.material.c1 {
+                let centre = self.centre(column, row);
+                let reaches = (0..2).all(|axis| {
+                    let middle_mm = centre[axis] - self.origin_mm[axis];
+                    middle_mm + half_mm >= low_mm[axis] && middle_mm - half_mm <= high_mm[axis]
+                });
+                if reaches {
+                    outlines.extend(self.faces(column, row).into_iter().map(|face| face.outline_mm));
+                }
+            }
+        }
+        outlines
+    }
+
     fn bottom_mm(&self) -> f64 {
         self.bottom_mm
     }

@@ -347,6 +347,16 @@ impl Surface for Mesh {
         self.top_mm
     }
 
+    fn outlines(&self, low_mm: [f64; 2], high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
+        let reaches = |t: &[[f64; 3]; 3]| {
+            (0..2).all(|axis| {
+                t.iter().any(|corner| corner[axis] >= low_mm[axis])
+                    && t.iter().any(|corner| corner[axis] <= high_mm[axis])
+            })
+        };
+        (0..self.triangles()).map(|index| self.triangle(index)).filter(reaches).map(Vec::from).collect()
+    }
+
     /// The lowest corner of a triangle that looks up, seen or not: the base of a solid does not
     /// count, a ledge under an overhang does.
     fn bottom_mm(&self) -> f64 {

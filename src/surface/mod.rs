@@ -102,6 +102,13 @@ pub trait Surface: Send + Sync {
         Ok(range)
     }
 
+    /// Corners of the planar faces that reach into a rectangle, each convex, x and y from the
+    /// lattice's lower left corner; none where there are only samples. A cutter that touches none
+    /// of them and no sample touches nothing.
+    fn outlines(&self, _low_mm: [f64; 2], _high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
+        Vec::new()
+    }
+
     /// The part turned rigidly until its best-fit plane is horizontal.
     fn levelled(&self) -> Result<Level, Error> {
         Err(Error::NotLevelled)
@@ -131,6 +138,9 @@ macro_rules! forward {
             }
             fn range_mm(&self, window: Window) -> Result<Option<[f64; 2]>, Error> {
                 (**self).range_mm(window)
+            }
+            fn outlines(&self, low_mm: [f64; 2], high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
+                (**self).outlines(low_mm, high_mm)
             }
             fn levelled(&self) -> Result<Level, Error> {
                 (**self).levelled()

@@ -1,0 +1,60 @@
+//! Bad input to `compensate`: exit 2, one message, no file under a final name. A case is a file in
+//! tests/refuse/compensation: the message after `error: `, then `args:` and `part.npy:` with the
+//! rows of a part, lowest first, or `part.stl:` with its lines.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use npyz::WriterBuilder;
+
+fn write_part(path: &Path, rows: &str) {
+    let rows: Vec<Vec<f32>> = rows
+        .split(';')
+        .map(|row| row.split_whitespace().map(|z| z.parse().expect("a height")).collect())
+        .collect();
+    let shape = [rows.len() as u64, rows[0].len() as u64];
+    let file = fs::File::create(path).expect("a scratch file");
+    let mut writer =
+        npyz::WriteOptions::new().default_dtype().shape(&shape).writer(file).begin_nd().expect("a header");
+    writer.extend(rows.into_iter().flatten()).expect("heights");
+    writer.finish().expect("a file");
+}
+
+#[test]
+fn every_case_is_refused_as_its_file_says() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/refuse/compensation");
+    let mut cases: Vec<_> =
+        fs::read_dir(folder).expect("cases").map(|entry| entry.expect("a case").path()).collect();
+    cases.sort();
+    assert!(cases.len() >= 8);
+    for case in cases {
+        let name = case.display();
+        let text = fs::read_to_string(&case).expect("a case");
+        let mut lines = text.lines();
+        let message = lines.next().expect("a message");
+        let scratch = tempfile::tempdir().expect("a scratch folder");
+        let dir = scratch.path().display().to_string();
+        let mut arguments = Vec::new();
+        for line in lines {
+            match line.split_once(": ") {
+                Some(("args", words)) => {
+                    arguments = words.split_whitespace().map(|word| word.replace("{dir}", &dir)).collect();
+                }
+                Some((file, lines)) if file.ends_with(".stl") => {
+                    fs::write(scratch.path().join(file), lines.replace("; ", "\n")).expect("a scratch file");
+                }
+                Some((file, rows)) => write_part(&scratch.path().join(file), rows),
+                None => panic!("{name}: {line}"),
+            }
+        }
+        let before = fs::read_dir(scratch.path()).expect("a folder").count();
+        let done =
+            Command::cargo_bin("screenmill").expect("the program").args(&arguments).output().expect("a run");
+        let said = String::from_utf8_lossy(&done.stderr).replace(&dir, "{dir}");
+        assert_eq!(done.status.code(), Some(2), "{name}: {said}");
+        assert_eq!(said.lines().next(), Some(format!("error: {message}").as_str()), "{name}");
+        assert!(said.lines().count() <= 12, "{name}");
+        assert_eq!(fs::read_dir(scratch.path()).expect("a folder").count(), before, "{name} left a file");
+    }
+}
