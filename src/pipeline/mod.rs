@@ -13,6 +13,7 @@ mod error;
 mod judge;
 mod light;
 mod maps;
+mod pages;
 mod part;
 mod plan;
 mod report;

@@ -6,7 +6,7 @@ use super::cut::{Milled, TileResult};
 use super::part::Part;
 use super::plan::{self, Program};
 use super::shop::Shop;
-use super::{Error, light};
+use super::{Error, light, pages};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
 use crate::job::{Form, Job};
@@ -72,7 +72,8 @@ pub fn finish(
     cavity_list::write_csv(&staging.join("cavities.csv"), &cavities)?;
     cavity_list::write_geojson(&staging.join("cavities.geojson"), &cavities)?;
     report::write_json(&staging.join("report.json"), &report)?;
-    let simulate = results.iter().map(|result| simulate(shop, result)).collect();
+    let simulate: Vec<String> = results.iter().map(|result| simulate(shop, result)).collect();
+    pages::write(job, shop, &report, &results, &simulate, staging)?;
     Ok(Milled { report, simulate })
 }
 
