@@ -40,7 +40,12 @@ pub enum Error {
     MissingKey { path: String, line: usize, key: String, place: String },
     #[error("{path}:{line}: {key}{message}")]
     Type { path: String, line: usize, key: String, message: String },
-    #[error("{path}:{line}: {key} is {value}; hint: it must lie in {low} .. {high}")]
+    #[error(
+        "{path}:{line}: {key} is {}; hint: it must lie in {} .. {}",
+        plain(value),
+        plain(low),
+        plain(high)
+    )]
     Range { path: String, line: usize, key: String, value: f64, low: f64, high: f64 },
     #[error("{path}:{line}: schema is {found}, this version reads schema {known}; hint: schema = {known}")]
     Schema { path: String, line: usize, found: u32, known: u32 },
@@ -201,6 +206,16 @@ impl Source {
         let before = self.text.get(..at).unwrap_or_default();
         let line = before.rsplit('\n').next().unwrap_or_default();
         line.split_once('=').map_or(String::new(), |(key, _)| format!("{}{then}", key.trim()))
+    }
+}
+
+/// A number without a row of zeros.
+fn plain(value: &f64) -> String {
+    let size = value.abs();
+    if size > 0.0 && !(1e-4..1e9).contains(&size) && size.is_finite() {
+        format!("{value:e}")
+    } else {
+        format!("{value}")
     }
 }
 

@@ -44,8 +44,8 @@ fn one_cell_matches(scene: &Scene, case: &Value) {
     for (g, expected) in wanted.gradients.iter().zip(&gradients) {
         assert!(largest_difference(g, expected) < 1e-12);
     }
-    let solved =
-        screen::solve(&mut Workspace::default(), &wanted.gradients, &wanted.weights, 4.0, 1e-6).expect("a solution");
+    let solved = screen::solve(&mut Workspace::default(), &wanted.gradients, &wanted.weights, 4.0, 1e-6)
+        .expect("a solution");
     assert!(largest_difference(&solved.areas_mm2, &numbers(&case["target_proj_mm2"])) < 1e-12);
     for (a, p) in solved.achieved_mm2.iter().zip(&solved.areas_mm2) {
         assert!((a / p - 1.0).abs() <= 1e-6);

@@ -1,12 +1,17 @@
+//! Designs written and read back, and what they say of their own surface.
+
 use screenmill::screen::{self, CellRange, Design, Profile, Scene};
 
-fn scene(name: &str) -> Scene {
-    let path = format!("{}/samples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    Scene::read(path.as_ref()).expect("a sample scene")
+/// The theatre at the elevation of all zeros: what is tested here is one cell at a time.
+fn theatre() -> Scene {
+    let path = format!("{}/samples/theatre.toml", env!("CARGO_MANIFEST_DIR"));
+    let mut scene = Scene::read(path.as_ref()).expect("a sample scene");
+    scene.elevation = screen::ElevationMethod::Flat;
+    scene
 }
 
 fn designed(profile: Profile) -> Design {
-    let mut scene = scene("theatre");
+    let mut scene = theatre();
     scene.microgeometry.profile = profile;
     let cells = CellRange { c0: 324, r0: 149, c1: 327, r1: 151 };
     screen::design(&scene, Some(cells), None, &|_, _| ()).expect("a design")
@@ -32,5 +37,114 @@ fn the_polygons_of_a_cell_have_its_areas_and_cover_it_once() {
             }
             assert!((covered - 16.0).abs() < 1e-12);
         }
+    }
+}
+
+#[test]
+fn a_container_reads_back_as_it_was_and_writes_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for profile in [Profile::Bump, Profile::Dish] {
+        let design = designed(profile);
+        let paths = ["a.npz", "b.npz"].map(|name| folder.path().join(name));
+        design.write(&paths[0]).expect("written");
+        let read = Design::read(&paths[0]).expect("read");
+        assert_eq!(read, design);
+        read.write(&paths[1]).expect("written");
+        let bytes = paths.map(|path| std::fs::read(path).expect("bytes"));
+        assert_eq!(bytes[0], bytes[1]);
+    }
+}
+
+#[test]
+fn a_cell_does_not_depend_on_its_company() {
+    let scene = theatre();
+    let one = CellRange { c0: 325, r0: 150, c1: 326, r1: 151 };
+    let alone = screen::design(&scene, Some(one), None, &|_, _| ()).expect("a design");
+    let among = designed(Profile::Bump);
+    assert_eq!(alone.cells[0], *among.cell(325, 150).expect("the cell"));
+    let mut stitched = scene.clone();
+    stitched.microgeometry.seam = screen::Seam::Stitched;
+    let ringed = screen::design(&stitched, Some(one), None, &|_, _| ()).expect("a design");
+    assert_eq!(ringed.cells.len(), 9);
+    assert_eq!(ringed.core, one);
+    assert_eq!(alone.cells[0], *ringed.cell(325, 150).expect("the cell"));
+    assert_eq!(ringed.core_cells().count(), 1);
+    let corner = CellRange { c0: 0, r0: 249, c1: 1, r1: 250 };
+    let cornered = screen::design(&stitched, Some(corner), None, &|_, _| ()).expect("a design");
+    assert_eq!(cornered.extent(), CellRange { c0: 0, r0: 248, c1: 2, r1: 250 });
+}
+
+#[test]
+fn a_dish_is_the_bump_turned_and_upside_down() {
+    let (bump, dish) = (designed(Profile::Bump), designed(Profile::Dish));
+    for (b, d) in bump.cells.iter().zip(&dish.cells) {
+        assert_eq!(b.elevation_mm, d.elevation_mm);
+        for k in 0..400 {
+            let p = [f64::from(k % 20) * 0.2 - 1.9, f64::from(k / 20) * 0.2 - 1.9];
+            let up = b.height_mm([-p[0], -p[1]], Profile::Bump) - b.elevation_mm;
+            let down = d.height_mm(p, Profile::Dish) - d.elevation_mm;
+            assert!((up + down).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn extremes_are_those_of_the_surface_and_its_mean_is_the_elevation() {
+    for profile in [Profile::Bump, Profile::Dish] {
+        let design = designed(profile);
+        for cell in &design.cells {
+            let [low, high] = cell.extremes_mm(design.cell_mm, profile);
+            let (mut least, mut most, mut sum) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+            for k in 0..40_000 {
+                let p = [f64::from(k % 200) * 0.02 - 1.99, f64::from(k / 200) * 0.02 - 1.99];
+                let z = cell.height_mm(p, profile);
+                (least, most, sum) = (least.min(z), most.max(z), sum + z);
+            }
+            assert!(low <= least && least - low < 0.01, "{low} {least}");
+            assert!(high >= most && high - most < 0.01, "{high} {most}");
+            assert!((sum / 40_000.0 - cell.elevation_mm).abs() < 2e-5);
+        }
+    }
+}
+
+#[test]
+fn the_best_plane_of_a_tilted_design_is_its_tilt() {
+    let mut design = designed(Profile::Bump);
+    let centres: Vec<[f64; 2]> = design.cells.iter().map(|cell| design.centre_mm(cell)).collect();
+    assert_eq!(centres[0], [2.0, 2.0]);
+    for (cell, [x, y]) in design.cells.iter_mut().zip(centres) {
+        cell.elevation_mm = 3.0 + 0.2 * x - 0.05 * y;
+    }
+    for (found, expected) in design.best_plane().iter().zip([3.0, 0.2, -0.05]) {
+        assert!((found - expected).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn solids_are_closed_and_hold_the_volume_under_the_surface() {
+    for profile in [Profile::Bump, Profile::Dish] {
+        let design = designed(profile);
+        let cell = design.cell(325, 150).expect("the cell");
+        let base = cell.elevation_mm - 2.0;
+        let solid = design.solid(cell, base).expect("closed");
+        let mut edges = std::collections::BTreeMap::new();
+        let mut volume = 0.0;
+        for triangle in &solid {
+            let v = triangle.vertices.map(|v| v.0.map(f64::from));
+            let cross = [
+                v[1][1] * v[2][2] - v[1][2] * v[2][1],
+                v[1][2] * v[2][0] - v[1][0] * v[2][2],
+                v[1][0] * v[2][1] - v[1][1] * v[2][0],
+            ];
+            volume += (v[0][0] * cross[0] + v[0][1] * cross[1] + v[0][2] * cross[2]) / 6.0;
+            for k in 0..3 {
+                let key = |at: usize| triangle.vertices[at].0.map(f32::to_bits);
+                *edges.entry((key(k), key((k + 1) % 3))).or_insert(0) += 1;
+                *edges.entry((key((k + 1) % 3), key(k))).or_insert(0) -= 1;
+            }
+        }
+        assert!(edges.values().all(|&count| count == 0), "every edge has its opposite");
+        // Mean height is the elevation: 2 mm over 16 mm2.
+        assert!((volume - 32.0).abs() < 1e-3, "{volume}");
     }
 }

@@ -143,7 +143,7 @@ impl Design {
                 wanted: "at least one cell".into(),
             });
         }
-        if !(cell_mm > 0.0) {
+        if cell_mm <= 0.0 {
             return refuse("cell_mm", 0, cell_mm, "a width above 0");
         }
         if profile != 0.0 && profile != 1.0 {
@@ -223,8 +223,9 @@ impl Design {
         }
         let CellRange { c0, r0, c1, r1 } = self.core;
         let (has_c1, has_r1) = (i64::from(left) + columns, i64::from(bottom) + rows);
-        let inside = left <= c0 && c0 < c1 && i64::from(c1) <= has_c1;
-        if !inside || !(bottom <= r0 && r0 < r1 && i64::from(r1) <= has_r1) {
+        let across = left <= c0 && c0 < c1 && i64::from(c1) <= has_c1;
+        let up = bottom <= r0 && r0 < r1 && i64::from(r1) <= has_r1;
+        if !across || !up {
             let (has_c0, has_r0) = (left, bottom);
             return Err(ContainerError::Core { path, c0, r0, c1, r1, has_c0, has_r0, has_c1, has_r1 });
         }

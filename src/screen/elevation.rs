@@ -43,7 +43,7 @@ impl Elevation {
         if (columns, rows) != (wanted_columns, wanted_rows) || self.z_mm.len() != columns * rows {
             return Err(Error::ElevationShape { rows, columns, wanted_rows, wanted_columns });
         }
-        match self.z_mm.iter().position(|z| !(z.abs() <= MOST_MM)) {
+        match self.z_mm.iter().position(|z| z.is_nan() || z.abs() > MOST_MM) {
             Some(at) => Err(Error::ElevationValue {
                 column: at % columns,
                 row: at / columns,
@@ -276,17 +276,14 @@ mod tests {
 
     #[test]
     fn interpolating_the_mean_gradient_costs_less_than_a_micrometre() {
-        for name in ["theatre", "home-theatre"] {
-            let mut scene = sample(name);
-            scene.microgeometry.width_mm = 10.0;
-            let (columns, rows) = (scene.columns(), scene.rows());
-            // Half as many nodes as the design takes, against a node at every cell.
-            let mut coarse = vec![0.0; columns * rows];
-            settle(&scene, &Nodes::over(columns, rows, 0.5 * GAPS), &mut coarse).expect("settles");
-            let mut dense = coarse.clone();
-            settle(&scene, &Nodes::over(columns, rows, 1e9), &mut dense).expect("settles");
-            let worst_m = coarse.iter().zip(&dense).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(worst_m < 1e-6, "{name}: {worst_m} m");
-        }
+        let mut scene = sample("theatre");
+        scene.microgeometry.width_mm = 6.0;
+        let (columns, rows) = (scene.columns(), scene.rows());
+        let mut interpolated = vec![0.0; columns * rows];
+        settle(&scene, &Nodes::over(columns, rows, GAPS), &mut interpolated).expect("settles");
+        let mut exact = interpolated.clone();
+        settle(&scene, &Nodes::over(columns, rows, 1e9), &mut exact).expect("settles");
+        let worst_m = interpolated.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst_m < 5e-7, "{worst_m} m");
     }
 }

@@ -102,3 +102,32 @@ pub fn facets(scene: &Scene, point_m: DVec3, directions: &[DVec3]) -> Result<Wan
     }
     Ok(wanted)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::screen::directions;
+
+    #[test]
+    fn exact_areas_send_every_direction_the_same_light() {
+        let text = include_str!("../../samples/theatre.toml").replace("area = \"paper\"", "area = \"exact\"");
+        let scene = Scene::parse(&text, "theatre.toml").expect("a scene");
+        let x = DVec3::new(0.9, 0.4, 0.12);
+        let i = (scene.projector_m - x).normalize();
+        let list = directions(&scene.view(x), 200).expect("an audience").list;
+        let wanted = facets(&scene, x, &list).expect("facets");
+        let total: f64 = wanted.weights.iter().sum();
+        let mean = |axis: usize| -> f64 {
+            wanted.gradients.iter().zip(&wanted.weights).map(|(g, p)| g[axis] * p).sum::<f64>() / total
+        };
+        let m = DVec2::new(mean(0), mean(1));
+        assert!(m.length() > 0.3, "a corner of the screen is steep: {m}");
+        for ((&o, g), p) in list.iter().zip(&wanted.gradients).zip(&wanted.weights) {
+            let normal = DVec3::new(-g[0], -g[1], 1.0).normalize();
+            // Light that the mirror catches and sends on, over the base's projected area towards o.
+            let caught = p / normal.z * i.dot(normal) * scene.reflector.index.reflectance(i.dot(normal));
+            let seen = o.z - m.dot(o.truncate());
+            assert!((caught / seen - 1.0).abs() < 1e-12, "{caught} {seen}");
+        }
+    }
+}

@@ -6,9 +6,11 @@
 //! Kitagawa, Merigot and Thibert, "Convergence of a Newton algorithm for semi-discrete optimal
 //! transport", J. Eur. Math. Soc. 21 (2019), doi:10.4171/jems/889.
 
+use std::sync::Once;
+
 use faer::prelude::Solve;
 use faer::sparse::{SparseColMat, Triplet};
-use faer::{Mat, Side};
+use faer::{Mat, Par, Side};
 
 use super::power::{Diagram, SIDES, area_and_moments};
 
@@ -192,6 +194,9 @@ fn quadratic_start(gradients: &[[f64; 2]], half_mm: f64) -> Vec<f64> {
 /// and j over |g_i - g_j|: the areas' derivative is -L. One unknown is pinned, since only
 /// differences count. None if L is singular beyond that.
 fn newton_step(diagram: &Diagram, gx: &[f64], gy: &[f64], r: &[f64]) -> Option<Vec<f64>> {
+    // Cells are what runs in parallel; a factorisation split over threads would round by their number.
+    static ONE_THREAD: Once = Once::new();
+    ONE_THREAD.call_once(|| faer::set_global_parallelism(Par::Seq));
     let n = r.len();
     if n < 2 {
         return Some(vec![0.0; n]);

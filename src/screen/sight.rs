@@ -165,7 +165,7 @@ mod tests {
         let point = DVec3::new(0.1, 0.05, 0.0);
         let both = solid_angle(&whole, point);
         assert!((both - solid_angle(&turned, point)).abs() < 1e-7);
-        assert!(both < solid_angle(&[near.clone()], point) + solid_angle(&[far], point) - 1e-3);
+        assert!(both < solid_angle(std::slice::from_ref(&near), point) + solid_angle(&[far], point) - 1e-3);
         assert!(
             (solid_angle(&[near.clone(), near.clone()], point) - solid_angle(&[near], point)).abs() < 1e-12
         );

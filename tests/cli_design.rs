@@ -1,0 +1,109 @@
+//! `screenmill design` as sentences.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use screenmill::screen::Design;
+
+fn sample(name: &str) -> String {
+    format!("{}/samples/{name}.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn design(arguments: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("screenmill").expect("the program").arg("design").args(arguments).assert()
+}
+
+fn is_empty(folder: &Path) -> bool {
+    fs::read_dir(folder).expect("a folder").next().is_none()
+}
+
+#[test]
+fn designing_a_few_cells_writes_them_and_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (npz, stl) = (folder.path().join("a.npz"), folder.path().join("a.stl"));
+    let (npz, stl) = (npz.to_str().expect("text"), stl.to_str().expect("text"));
+    design(&[&sample("theatre"), "--out", npz, "--stl", stl, "--cells", "324", "149", "327", "152"])
+        .success()
+        .stdout(predicate::str::contains("9 cells of 4 mm: columns 324 to 327, rows 149 to 152, 12 x 12 mm"))
+        .stdout(predicate::str::contains("200 facets a cell, 1800 in all"));
+    assert_eq!(Design::read(npz.as_ref()).expect("a design").cells.len(), 9);
+    // The reference's solids of the same cells have as many triangles.
+    assert_eq!(fs::metadata(stl).expect("a file").len(), 84 + 50 * 8138);
+}
+
+#[test]
+fn the_thread_count_does_not_change_a_byte() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let made = ["1", "3"].map(|threads| {
+        let path = folder.path().join(threads);
+        let out = path.to_str().expect("text");
+        let output = design(&[
+            &sample("home-theatre"),
+            "--out",
+            out,
+            "--cells",
+            "0",
+            "0",
+            "6",
+            "4",
+            "--threads",
+            threads,
+            "--quiet",
+            "--json",
+        ])
+        .success()
+        .stderr("");
+        let json: serde_json::Value =
+            serde_json::from_slice(&output.get_output().stdout).expect("one JSON object");
+        assert_eq!(json["cells"], 24);
+        assert_eq!(json["facets_per_cell"], serde_json::json!([200, 200]));
+        fs::read(path).expect("bytes")
+    });
+    assert!(made[0] == made[1]);
+}
+
+#[test]
+fn a_given_elevation_is_taken_as_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("a.npz");
+    let npy = folder.path().join("e.npy");
+    let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (250, 500), }";
+    let mut bytes = b"\x93NUMPY\x01\x00v\x00".to_vec();
+    bytes.extend(format!("{text:<117}\n").bytes());
+    bytes.extend((0..125_000u32).flat_map(|at| ((at % 500) as f32 + 0.5 * (at / 500) as f32).to_le_bytes()));
+    fs::write(&npy, bytes).expect("written");
+    let (out, npy) = (out.to_str().expect("text"), npy.to_str().expect("text"));
+    design(&[&sample("theatre"), "--out", out, "--elevation", npy, "--cells", "7", "10", "9", "11"])
+        .success();
+    let design = Design::read(out.as_ref()).expect("a design");
+    assert_eq!(design.cells.iter().map(|cell| cell.elevation_mm).collect::<Vec<_>>(), [12.0, 13.0]);
+}
+
+#[test]
+fn a_refusal_is_one_message_and_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("a.npz");
+    let out = out.to_str().expect("text");
+    design(&[&sample("theatre"), "--out", out, "--cells", "499", "0", "501", "1"]).code(2).stderr(
+        predicate::str::starts_with("error: cells 499 0 501 1 do not lie in the screen's 500 x 250 cells"),
+    );
+    assert!(is_empty(folder.path()));
+    design(&[&sample("missing"), "--out", out]).code(2).stderr(predicate::str::contains("missing.toml"));
+    design(&[&sample("theatre"), "--out", out, "--elevation", &sample("theatre")]).code(2);
+    assert!(is_empty(folder.path()));
+    let nowhere = folder.path().join("no/such/a.npz");
+    design(&[&sample("theatre"), "--out", nowhere.to_str().expect("text")])
+        .code(2)
+        .stderr(predicate::str::contains("cannot be written"));
+    design(&[&sample("theatre"), "--out", folder.path().to_str().expect("text")])
+        .code(2)
+        .stderr(predicate::str::contains("is a folder"));
+    let stitched = folder.path().join("stitched.toml");
+    let text = fs::read_to_string(sample("theatre")).expect("a sample").replace("\"step\" ", "\"stitched\" ");
+    fs::write(&stitched, text).expect("written");
+    design(&[stitched.to_str().expect("text"), "--out", out, "--stl", out, "--cells", "0", "0", "1", "1"])
+        .code(2)
+        .stderr(predicate::str::contains("a stitched design is not written as .stl"));
+}

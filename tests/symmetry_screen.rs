@@ -1,0 +1,75 @@
+//! Cells turned, scaled and shuffled.
+
+use screenmill::screen::{Workspace, solve};
+
+fn facets(count: usize) -> (Vec<[f64; 2]>, Vec<f64>) {
+    let spread = |k: usize, step: f64| (k as f64 * step).fract() - 0.5;
+    let gradients = (0..count).map(|k| [0.3 * spread(k, 0.754_877_666), 0.2 * spread(k, 0.569_840_296)]);
+    (gradients.collect(), (0..count).map(|k| 1.0 + spread(k, 0.618_033_988)).collect())
+}
+
+fn offsets(gradients: &[[f64; 2]], weights: &[f64], width_mm: f64) -> Vec<f64> {
+    let mut workspace = Workspace::default();
+    solve(&mut workspace, gradients, weights, width_mm, 1e-9).expect("a solution").offsets_mm
+}
+
+fn equal(a: &[f64], b: &[f64]) {
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.iter().zip(b) {
+        assert!((a - b).abs() < 1e-8, "{a} {b}");
+    }
+}
+
+#[test]
+fn quarter_turns_and_mirrors_leave_the_offsets() {
+    for count in [1, 2, 3, 20, 150] {
+        let (g, p) = facets(count);
+        let c = offsets(&g, &p, 4.0);
+        let turned: Vec<[f64; 2]> = g.iter().map(|g| [-g[1], g[0]]).collect();
+        let mirrored: Vec<[f64; 2]> = g.iter().map(|g| [-g[0], g[1]]).collect();
+        equal(&c, &offsets(&turned, &p, 4.0));
+        equal(&c, &offsets(&mirrored, &p, 4.0));
+    }
+}
+
+#[test]
+fn a_cell_twice_as_wide_is_twice_as_high() {
+    let (g, p) = facets(60);
+    let doubled: Vec<f64> = offsets(&g, &p, 4.0).iter().map(|c| 2.0 * c).collect();
+    equal(&doubled, &offsets(&g, &p, 8.0));
+}
+
+#[test]
+fn a_tilt_of_all_facets_tilts_the_cell() {
+    let (g, p) = facets(60);
+    let tilted: Vec<[f64; 2]> = g.iter().map(|g| [g[0] + 0.1, g[1] - 0.3]).collect();
+    equal(&offsets(&g, &p, 4.0), &offsets(&tilted, &p, 4.0));
+}
+
+#[test]
+fn the_order_of_facets_does_not_matter() {
+    let (g, p) = facets(90);
+    let mut reversed = offsets(
+        &g.iter().rev().copied().collect::<Vec<_>>(),
+        &p.iter().rev().copied().collect::<Vec<_>>(),
+        4.0,
+    );
+    reversed.reverse();
+    equal(&offsets(&g, &p, 4.0), &reversed);
+}
+
+#[test]
+fn hard_facets_are_solved_too() {
+    let near: Vec<[f64; 2]> = (0..60).map(|k| [0.1 * f64::from(k / 2), 1e-6 * f64::from(k % 2)]).collect();
+    let clusters: Vec<[f64; 2]> = (0..80)
+        .map(|k| [f64::from(k % 2) * 2.0 + 1e-3 * f64::from(k % 7), 1e-3 * f64::from(k / 7)])
+        .collect();
+    let wild: Vec<f64> = (0..80).map(|k| f64::from(k % 9).exp()).collect();
+    let mut workspace = Workspace::default();
+    for (g, p) in [(&near, &vec![1.0; 60]), (&clusters, &vec![1.0; 80]), (&clusters, &wild)] {
+        let solved = solve(&mut workspace, g, p, 4.0, 1e-6).expect("a solution");
+        for (a, p) in solved.achieved_mm2.iter().zip(&solved.areas_mm2) {
+            assert!((a / p - 1.0).abs() <= 1e-6);
+        }
+    }
+}
