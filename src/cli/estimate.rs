@@ -1,23 +1,37 @@
-//! `screenmill estimate PROGRAM...`: how long programs run, and what limits them.
+//! `screenmill estimate`: how long a job or some programs run, and what limits them.
 
 use std::path::{Path, PathBuf};
 
+use screenmill::job::Job;
 use screenmill::machine::Machine;
+use screenmill::pipeline;
 use screenmill::verify::{Clock, Event, Extent, Kinematics, Language, Summary, Timing};
 use serde_json::{Map, Value, json};
 
+use super::console::Console;
 use super::program::{Refused, bounds, clock, stream};
 use super::{Common, Outcome, Refusal};
 
-/// Milling time of programs, with what limits it
+/// Milling time of a job or of programs, with what limits it
 #[derive(clap::Args, Clone, Debug)]
 pub struct Arguments {
-    /// Programs in G-code or RML-1
-    #[arg(required = true, value_name = "PROGRAM")]
+    /// A job file (.toml), or programs in G-code or RML-1
+    #[arg(required = true, value_name = "JOB.toml or PROGRAM")]
     programs: Vec<PathBuf>,
-    /// Machine profile: a name or a file
+    /// Machine profile for programs: a name or a file; a job names its own
     #[arg(long, value_name = "NAME")]
-    machine: String,
+    machine: Option<String>,
+}
+
+/// The arguments do not go together.
+#[derive(Debug, thiserror::Error)]
+enum Misused {
+    #[error("programs do not say which machine runs them; hint: --machine NAME, see screenmill machines")]
+    NoMachine,
+    #[error("{job} is a job, and {others} other files stand beside it; hint: one job at a time, or programs only")]
+    Mixed { job: String, others: usize },
+    #[error("--machine {machine} stands beside a job, which names its own machine; hint: leave --machine out")]
+    MachineOfJob { machine: String },
 }
 
 struct Estimated {
@@ -27,7 +41,19 @@ struct Estimated {
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
-    let machine = Machine::find(&arguments.machine, None)?;
+    let is_job = |path: &&PathBuf| path.extension().is_some_and(|extension| extension == "toml");
+    if let Some(path) = arguments.programs.iter().find(is_job) {
+        let others = arguments.programs.len() - 1;
+        if others > 0 {
+            return Err(Misused::Mixed { job: path.display().to_string(), others }.into());
+        }
+        if let Some(machine) = &arguments.machine {
+            return Err(Misused::MachineOfJob { machine: machine.clone() }.into());
+        }
+        return job(path, common);
+    }
+    let name = arguments.machine.as_deref().ok_or(Misused::NoMachine)?;
+    let machine = Machine::find(name, None)?;
     let kinematics = Kinematics::from(&machine);
     let mut total_s = 0.0;
     let mut limits: Vec<(&'static str, f64)> = Vec::new();
@@ -65,6 +91,51 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         }
     }
     Ok(Outcome::Within)
+}
+
+fn job(path: &Path, common: &Common) -> Result<Outcome, Refusal> {
+    let job = Job::read(path)?;
+    let scratch = tempfile::tempdir()?;
+    let console = Console::new(common.quiet || common.json, common.verbose);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let estimated = pipeline::estimate(&job, folder, scratch.path(), &console)?;
+    console.times();
+    let hours = estimated.total_s / 3600.0;
+    let over = estimated.hours_max.is_some_and(|most| hours > most);
+    if common.json {
+        let report = json!({
+            "time_s": estimated.total_s, "machine": estimated.machine, "post": estimated.post,
+            "limited_by": estimated.limits.first().map(|l| l.0), "parts": parts(&estimated.limits),
+            "by_operation": estimated.by_operation, "by_tool": estimated.by_tool,
+            "by_tile": estimated.by_tile, "cutting_mm": estimated.cutting_mm,
+            "rapid_mm": estimated.rapid_mm, "blocks": estimated.blocks, "tiles": estimated.tiles,
+            "hours_max": estimated.hours_max, "unconfirmed": estimated.unconfirmed,
+        });
+        println!("{report}");
+    } else {
+        for (name, seconds) in &estimated.by_operation.0 {
+            println!("{name}: {}", clock(*seconds));
+        }
+        println!(
+            "{} on {} in {} tile(s), {:.1} m of cut, {:.1} m of rapids: {}",
+            clock(estimated.total_s),
+            estimated.machine,
+            estimated.tiles,
+            1e-3 * estimated.cutting_mm,
+            1e-3 * estimated.rapid_mm,
+            shares(&estimated.limits, estimated.total_s)
+        );
+        if !estimated.unconfirmed.is_empty() {
+            println!(
+                "verify against your machine: {} of its profile are unconfirmed",
+                estimated.unconfirmed.join(", ")
+            );
+        }
+        if let Some(most) = estimated.hours_max.filter(|_| over) {
+            println!("{hours:.1} machine hours, {most} are allowed");
+        }
+    }
+    Ok(if over { Outcome::Found } else { Outcome::Within })
 }
 
 fn estimate(path: &Path, kinematics: &Kinematics) -> Result<Estimated, Refused> {

@@ -8,6 +8,19 @@ use super::console::Console;
 use super::staging::Staging;
 use super::{Common, Outcome, Refusal};
 
+/// What a job writes, and so what it replaces.
+const OUTPUTS: [&str; 9] = [
+    "programs",
+    "rejected",
+    "maps",
+    "report.json",
+    "report.html",
+    "setup-sheet.html",
+    "run.json",
+    "cavities.csv",
+    "cavities.geojson",
+];
+
 /// Cut a job: programs, proved, with maps, report and setup sheet
 #[derive(clap::Args, Debug)]
 pub struct Arguments {
@@ -35,7 +48,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         "stages_s": stages,
     });
     write_json(&staging.path().join("run.json"), &run)?;
-    staging.publish()?;
+    staging.publish(&OUTPUTS)?;
     let report = &milled.report;
     if common.json {
         println!("{}", serde_json::to_string(report)?);

@@ -1,6 +1,7 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod check;
 mod compensate;
 mod console;
 mod design;
@@ -51,6 +52,7 @@ pub struct Common {
 #[derive(Subcommand)]
 enum Command {
     Mill(mill::Arguments),
+    Check(check::Arguments),
     Estimate(estimate::Arguments),
     Design(design::Arguments),
     Raster(raster::Arguments),
@@ -91,6 +93,7 @@ pub fn run() -> ExitCode {
     let common = &arguments.common;
     let outcome: Result<Outcome, Refusal> = match &arguments.command {
         Command::Mill(arguments) => mill::run(arguments, common),
+        Command::Check(arguments) => check::run(arguments, common),
         Command::Estimate(arguments) => estimate::run(arguments, common),
         Command::Design(arguments) => design::run(arguments, common),
         Command::Raster(arguments) => raster::run(arguments, common),

@@ -6,19 +6,6 @@ use std::path::{Path, PathBuf};
 use screenmill::pipeline::Error;
 use tempfile::TempDir;
 
-/// What a job writes, and so what it replaces.
-const OUTPUTS: [&str; 9] = [
-    "programs",
-    "rejected",
-    "maps",
-    "report.json",
-    "report.html",
-    "setup-sheet.html",
-    "run.json",
-    "cavities.csv",
-    "cavities.geojson",
-];
-
 /// A hidden folder inside the output folder, removed with all it holds unless it is published.
 pub struct Staging {
     folder: TempDir,
@@ -42,9 +29,9 @@ impl Staging {
         self.folder.path()
     }
 
-    /// Puts everything under its final name; what an earlier run left there goes first.
-    pub fn publish(mut self) -> Result<(), Error> {
-        for name in OUTPUTS {
+    /// Puts these under their final names; what an earlier run left there goes first.
+    pub fn publish(mut self, outputs: &[&str]) -> Result<(), Error> {
+        for name in outputs {
             let (from, to) = (self.folder.path().join(name), self.out.join(name));
             let failed = |source| Error::OutputFolder { path: to.clone(), source };
             if to.is_dir() {

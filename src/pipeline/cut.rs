@@ -99,7 +99,10 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
 }
 
 /// Profiles of cutters without repetition, in order.
-fn distinct(shapes: impl Iterator<Item = crate::cutter::Shape>, step_mm: f64) -> Result<Vec<Profile>, Error> {
+pub fn distinct(
+    shapes: impl Iterator<Item = crate::cutter::Shape>,
+    step_mm: f64,
+) -> Result<Vec<Profile>, Error> {
     let mut profiles: Vec<Profile> = Vec::new();
     for shape in shapes {
         if !profiles.iter().any(|profile| profile.shape() == shape) {

@@ -9,7 +9,7 @@ use crate::compensation::{self, Profile, RowPass, RowTarget};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::cavities::{self, Labelled};
 use crate::fidelity::{self, Cavities, Found, Layers, Tally};
-use crate::grid::{Heights, Window};
+use crate::grid::{Heights, Lattice, Window};
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::toolpath::{Axis, Layout};
@@ -84,23 +84,19 @@ pub fn judge(
     let mut light_designed = LightTally::default();
     let mut light_machined: Vec<LightTally> = case.posts.iter().map(|_| LightTally::default()).collect();
     let mut cavities = Cavities::new(case.cavities, lattice.window());
-    for row in (0..lattice.rows).step_by(BLOCK_ROWS) {
-        let rows = BLOCK_ROWS.min(lattice.rows - row);
-        let starts: Vec<usize> = (0..lattice.columns).step_by(BLOCK_COLUMNS).collect();
-        let blocks: Vec<Block> = starts
+    for row in blocks(&lattice) {
+        let blocks: Vec<Block> = row
             .par_iter()
-            .map(|&column| {
+            .map(|&window| {
                 if progress.interrupted() {
                     return Err(Error::Interrupted);
                 }
-                let columns = BLOCK_COLUMNS.min(lattice.columns - column);
-                let window = Window { column: column as i64, row: row as i64, columns, rows };
                 let block = case.block(window);
-                progress.advance((columns * rows) as u64);
+                progress.advance(window.samples() as u64);
                 block
             })
             .collect::<Result<_, Error>>()?;
-        let window = Window { column: 0, row: row as i64, columns: lattice.columns, rows };
+        let window = Window { column: 0, columns: lattice.columns, ..row[0] };
         let mut strip = Strip {
             design: Heights::empty(window),
             machined: Heights::empty(window),
@@ -125,6 +121,22 @@ pub fn judge(
         each(strip)?;
     }
     Ok(Verdict { tallies, cuts, cavities: cavities.finish(), light_designed, light_machined })
+}
+
+/// The blocks of a tile, row by row, lowest y first.
+pub fn blocks(lattice: &Lattice) -> Vec<Vec<Window>> {
+    let starts = |count: usize, step: usize| (0..count).step_by(step);
+    starts(lattice.rows, BLOCK_ROWS)
+        .map(|row| {
+            let rows = BLOCK_ROWS.min(lattice.rows - row);
+            starts(lattice.columns, BLOCK_COLUMNS)
+                .map(|column| {
+                    let columns = BLOCK_COLUMNS.min(lattice.columns - column);
+                    Window { column: column as i64, row: row as i64, columns, rows }
+                })
+                .collect()
+        })
+        .collect()
 }
 
 fn paste(strip: &mut Heights, block: &Heights) {

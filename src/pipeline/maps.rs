@@ -95,3 +95,62 @@ impl Maps {
         Ok((MapFiles { design, machined, deviation, cavity }, factor))
     }
 }
+
+/// The one map of `check`: cavities of a set of cutters.
+pub struct CavityMap {
+    folder: PathBuf,
+    tile: String,
+    reducer: Reducer,
+    writer: HeightWriter,
+    preview: Preview,
+}
+
+impl CavityMap {
+    /// Opens the map of a tile under `out`/maps.
+    pub fn create(out: &Path, tile: &str, lattice: &Lattice, full: bool) -> Result<CavityMap, Error> {
+        let folder = out.join("maps");
+        std::fs::create_dir_all(&folder).map_err(|source| Error::Output { path: folder.clone(), source })?;
+        let (columns, rows) = (lattice.columns, lattice.rows);
+        let reducer = match full {
+            true => Reducer::by_factor(columns, rows, 1),
+            false => Reducer::within(columns, rows, maps::FULL_SAMPLES),
+        };
+        let pitch_mm = lattice.step_mm * reducer.factor() as f64;
+        let path = folder.join(format!("{tile}-cavity.tif"));
+        let writer = HeightWriter::create(&path, reducer.columns(), reducer.rows(), pitch_mm, [0.0, 0.0])?;
+        let preview = Preview::new(reducer.columns(), reducer.rows(), pitch_mm);
+        Ok(CavityMap { folder, tile: tile.into(), reducer, writer, preview })
+    }
+
+    /// Takes the next row of blocks, each its design and its cavities.
+    pub fn push(&mut self, blocks: &[(Heights, Heights)], columns: usize) -> Result<(), Error> {
+        let rows = blocks.first().map_or(0, |block| block.0.window.rows);
+        let mut design = vec![f32::NAN; rows * columns];
+        let mut cavity = design.clone();
+        for (from, depth) in blocks {
+            for row in 0..rows {
+                let at = row * columns + from.window.column as usize;
+                let own = row * from.window.columns..(row + 1) * from.window.columns;
+                design[at..at + from.window.columns].copy_from_slice(&from.z_mm[own.clone()]);
+                cavity[at..at + from.window.columns].copy_from_slice(&depth.z_mm[own]);
+            }
+        }
+        let strip = maps::Strip { design: &design, machined: &design, cavity: &cavity };
+        let (writer, preview) = (&mut self.writer, &mut self.preview);
+        self.reducer.push(strip, |row: &MapRow| -> Result<(), Error> {
+            let z_mm = row.cavity.clone();
+            let window = Window { column: 0, row: row.row as i64, columns: z_mm.len(), rows: 1 };
+            writer.write(&Heights { window, z_mm })?;
+            Ok(preview.take(row)?)
+        })
+    }
+
+    /// Gives the map its name and draws it.
+    pub fn finish(self, part: &str, origin_mm: [f64; 2], note: String) -> Result<(), Error> {
+        self.writer.finish()?;
+        let caption =
+            Caption { part: part.into(), tile: self.tile.clone(), origin_mm, notes: vec![note] };
+        let path = self.folder.join(format!("{}-cavity.png", self.tile));
+        Ok(picture::write_png(&path, &self.preview.draw(Kind::Cavity, &caption))?)
+    }
+}

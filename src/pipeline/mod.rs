@@ -8,8 +8,10 @@
 //!
 //! Everything is written under a staging folder that the caller renames when all of it stands.
 
+mod check;
 mod cut;
 mod error;
+mod estimate;
 mod judge;
 mod light;
 mod maps;
@@ -19,5 +21,7 @@ mod plan;
 mod report;
 mod shop;
 
+pub use check::{Checked, Reach, check};
 pub use cut::{Milled, mill};
 pub use error::Error;
+pub use estimate::{Estimated, estimate};

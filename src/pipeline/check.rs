@@ -1,0 +1,409 @@
+//! `check`: what each cutter of the library cannot reach, in area and in light, and the smallest set of cutters that
+//! keeps the job's limits. No paths are planned.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::cut::{distinct, setups};
+use super::judge::blocks;
+use super::light::{self, Sight};
+use super::part::Part;
+use super::plan::TileSetup;
+use super::shop::Shop;
+use super::{Error, maps};
+use crate::compensation::{self, Profile};
+use crate::fidelity::light::LightTally;
+use crate::fidelity::{self, Layers, Tally};
+use crate::grid::{Heights, Window};
+use crate::job::Job;
+use crate::machine::Tool;
+use crate::progress::Progress;
+use crate::report::{Finding, Light, Severity, Verdict, finding};
+
+/// Part of the area that has to lie within `limits.deviation_mm`.
+const WITHIN: f64 = 0.99;
+
+/// Sets of cutters whose light and normals are worked out before the job is called infeasible.
+const TRIED_SETS: usize = 4;
+
+/// Most cutters that are tried together.
+const MOST_CUTTERS: usize = 12;
+
+/// What one cutter, or a set, leaves of a part at best.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reach {
+    /// Names in the library.
+    pub tools: Vec<String>,
+    pub cutters: Vec<String>,
+    /// Part of the area that is left standing by more than the job's deviation limit.
+    pub unreachable_fraction: f64,
+    /// Part of the area that is left standing by more than 1 um.
+    pub cavity_area_fraction: f64,
+    pub cavity_max_depth_mm: f64,
+    pub normal_p95_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light: Option<Light>,
+    /// Why it cannot be used at all: stick-out, machine.
+    pub refused: Option<String>,
+}
+
+/// The answer of `check`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Checked {
+    pub schema: u32,
+    pub screenmill: String,
+    pub verdict: Verdict,
+    pub deviation_mm: f64,
+    pub tiles: usize,
+    pub z_range_mm: f64,
+    /// Each cutter by itself, as in the library.
+    pub cutters: Vec<Reach>,
+    /// The smallest set that keeps the limits.
+    pub smallest_set: Option<Reach>,
+    pub findings: Vec<Finding>,
+}
+
+/// One cutter under test.
+struct Candidate<'a> {
+    tool: &'a Tool,
+    profile: Profile,
+    refused: Option<String>,
+}
+
+/// What was measured of one set.
+#[derive(Clone)]
+struct Measured {
+    tally: Tally,
+    light: LightTally,
+}
+
+/// Checks a job; with `out`, the cavities of the set (or of all cutters, if none will do) are written as maps there.
+pub fn check(
+    job: &Job,
+    folder: &Path,
+    out: Option<&Path>,
+    progress: &dyn Progress,
+) -> Result<Checked, Error> {
+    let shop = Shop::open(job, folder)?;
+    let part = Part::load(job, progress)?;
+    if let (Some(limit), None) = (job.limits.on_audience_min, &part.scene) {
+        return Err(Error::NoLight { limit, what: "not designed from a scene" });
+    }
+    let tiles = setups(job, &shop, &part)?;
+    let candidates = candidates(job, &shop, &tiles)?;
+    let usable: Vec<usize> = (0..candidates.len()).filter(|&i| candidates[i].refused.is_none()).collect();
+    let job_facts = Facts { job, part: &part, tiles: &tiles, candidates: &candidates };
+    let singles: Vec<Vec<usize>> = (0..candidates.len()).map(|i| vec![i]).collect();
+    progress.begin("cutters one by one", job_facts.samples());
+    let (measured, masks, designed) = job_facts.measure(&singles, progress)?;
+    let mut cutters = Vec::new();
+    for (index, measured) in measured.iter().enumerate() {
+        cutters.push(job_facts.reach(&[index], measured, &designed));
+    }
+    let mut smallest_set = None;
+    let mut best: Vec<usize> = usable.clone();
+    for set in sets(&usable, &masks).into_iter().take(TRIED_SETS) {
+        progress.begin("sets of cutters", job_facts.samples());
+        let (measured, ..) = job_facts.measure(std::slice::from_ref(&set), progress)?;
+        let reach = job_facts.reach(&set, &measured[0], &designed);
+        if keeps(job, &reach) {
+            best = set;
+            smallest_set = Some(reach);
+            break;
+        }
+    }
+    let mut findings = Vec::new();
+    for note in &part.notes {
+        findings.push(finding(Severity::Warning, "input", note.clone()));
+    }
+    for candidate in &candidates {
+        if let Some(why) = &candidate.refused {
+            findings.push(finding(Severity::Warning, "cutter", why.clone()));
+        }
+    }
+    if smallest_set.is_none() {
+        findings.push(finding(Severity::Error, "unreachable", job_facts.why_not(&cutters)));
+    }
+    if let Some(out) = out {
+        progress.begin("maps", job_facts.samples());
+        job_facts.write_maps(&best, out, progress)?;
+    }
+    Ok(Checked {
+        schema: 1,
+        screenmill: env!("CARGO_PKG_VERSION").into(),
+        verdict: if smallest_set.is_some() { Verdict::Pass } else { Verdict::Fail },
+        deviation_mm: job.limits.deviation_or_default_mm(),
+        tiles: tiles.len(),
+        z_range_mm: part.whole.top_mm() - part.whole.bottom_mm(),
+        cutters,
+        smallest_set,
+        findings,
+    })
+}
+
+/// The library's cutters of distinct shapes, and why some cannot be used on this part.
+fn candidates<'a>(job: &Job, shop: &'a Shop, tiles: &[TileSetup]) -> Result<Vec<Candidate<'a>>, Error> {
+    let needs = tiles.iter().map(|tile| tile.need(job));
+    let depth_mm = needs.map(|need| need.depth_mm + need.top_allowance_mm).fold(0.0, f64::max);
+    let mut candidates: Vec<Candidate> = Vec::new();
+    let tools = shop.library.tools.iter().chain(&shop.tools);
+    for tool in tools.filter(|tool| tool.shape.radius_mm() >= job.part.step_mm) {
+        if candidates.iter().any(|known| known.tool.shape == tool.shape) {
+            continue;
+        }
+        let reach = tool.check_reach(depth_mm).err().map(|refusal| refusal.to_string());
+        let machine = shop.machine.run(tool).err().map(|refusal| refusal.to_string());
+        let profile = distinct(std::iter::once(tool.shape), job.part.step_mm)?.remove(0);
+        candidates.push(Candidate { tool, profile, refused: reach.or(machine) });
+    }
+    // The finest cutters decide, so they are the ones to keep where there are too many.
+    candidates.sort_by(|a, b| a.tool.shape.radius_mm().total_cmp(&b.tool.shape.radius_mm()));
+    candidates.truncate(MOST_CUTTERS);
+    Ok(candidates)
+}
+
+/// Whether the limits on the shape and its light hold for a set.
+fn keeps(job: &Job, reach: &Reach) -> bool {
+    let limits = &job.limits;
+    let normals = match (limits.normal_p95_deg, reach.normal_p95_deg) {
+        (Some(limit), Some(value)) => value <= limit,
+        _ => true,
+    };
+    let light = match (limits.on_audience_min, &reach.light) {
+        (Some(limit), Some(light)) => light.on_audience_machined >= limit,
+        _ => true,
+    };
+    reach.unreachable_fraction <= 1.0 - WITHIN && normals && light
+}
+
+/// Sets of usable cutters that leave at most 1 % of the area out of the limit, smallest first, then those with the
+/// larger cutters. `masks[m]` counts the samples that exactly the cutters of the bits of m reach.
+fn sets(usable: &[usize], masks: &[u64]) -> Vec<Vec<usize>> {
+    let total: u64 = masks.iter().sum();
+    let bits = usable.iter().fold(0usize, |bits, index| bits | 1 << index);
+    let mut found: Vec<usize> = (1..masks.len())
+        .filter(|set| set & !bits == 0)
+        .filter(|set| {
+            let missed: u64 = (0..masks.len()).filter(|mask| mask & set == 0).map(|mask| masks[mask]).sum();
+            missed as f64 <= (1.0 - WITHIN) * total as f64
+        })
+        .collect();
+    found.sort_by_key(|set| (set.count_ones(), std::cmp::Reverse(*set)));
+    found.into_iter().map(|set| usable.iter().copied().filter(|index| set >> index & 1 == 1).collect()).collect()
+}
+
+/// The part and the cutters that are tried on it.
+struct Facts<'a> {
+    job: &'a Job,
+    part: &'a Part,
+    tiles: &'a [TileSetup],
+    candidates: &'a [Candidate<'a>],
+}
+
+impl Facts<'_> {
+    fn samples(&self) -> u64 {
+        self.tiles.iter().map(|tile| tile.surface().lattice()).map(|l| (l.columns * l.rows) as u64).sum()
+    }
+
+    fn params(&self) -> fidelity::Params {
+        let limit_mm = Some(self.job.limits.deviation_or_default_mm());
+        fidelity::Params { step_mm: self.job.part.step_mm, limit_mm }
+    }
+
+    /// Tallies of each set over all tiles, how many samples each combination of single cutters reaches, and the
+    /// light of the design.
+    fn measure(
+        &self,
+        sets: &[Vec<usize>],
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Measured>, Vec<u64>, LightTally), Error> {
+        let fresh = || Measured { tally: Tally::new(self.params()), light: LightTally::default() };
+        let mut totals: Vec<Measured> = sets.iter().map(|_| fresh()).collect();
+        let mut masks = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
+        let mut designed = LightTally::default();
+        for tile in self.tiles {
+            let sight = self.sight(tile);
+            for row in blocks(&tile.surface().lattice()) {
+                let measured: Vec<_> = row
+                    .par_iter()
+                    .map(|&window| {
+                        if progress.interrupted() {
+                            return Err(Error::Interrupted);
+                        }
+                        let done = self.block(tile, sight.as_ref(), window, sets);
+                        progress.advance(window.samples() as u64);
+                        done
+                    })
+                    .collect::<Result<_, Error>>()?;
+                for (sets, counts, light) in measured {
+                    for (total, set) in totals.iter_mut().zip(&sets) {
+                        total.tally.merge(&set.tally);
+                        total.light.merge(&set.light);
+                    }
+                    for (sum, count) in masks.iter_mut().zip(counts) {
+                        *sum += count;
+                    }
+                    designed.merge(&light);
+                }
+            }
+        }
+        Ok((totals, masks, designed))
+    }
+
+    fn sight(&self, tile: &TileSetup) -> Option<Sight<'_>> {
+        let steepest = tile.surface().steepest();
+        let pose = self.part.pose(self.job, &tile.piece)?;
+        let scene = self.part.scene.as_ref()?;
+        Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]) })
+    }
+
+    fn block(
+        &self,
+        tile: &TileSetup,
+        sight: Option<&Sight>,
+        window: Window,
+        sets: &[Vec<usize>],
+    ) -> Result<(Vec<Measured>, Vec<u64>, LightTally), Error> {
+        let surface = tile.surface();
+        let step_mm = self.job.part.step_mm;
+        let limit_mm = self.job.limits.deviation_or_default_mm() as f32;
+        let reach = sets.iter().flatten().map(|&i| self.candidates[i].profile.reach()).max().unwrap_or(0);
+        let near = window.grown(1);
+        let around = surface.heights(near.grown(2 * reach), surface.top_mm())?;
+        let design = around.crop(near);
+        let mut designed = LightTally::default();
+        if let Some(sight) = sight {
+            sight.add(&mut designed, &design, window, step_mm);
+        }
+        let mut reached = vec![0u16; near.samples()];
+        let mut measured = Vec::new();
+        for (bit, set) in sets.iter().enumerate() {
+            let closing = self.closing(&around, set, near);
+            for ((mask, closed), z) in reached.iter_mut().zip(&closing.z_mm).zip(&design.z_mm) {
+                *mask |= u16::from(closed - z <= limit_mm) << bit;
+            }
+            let mut tally = Tally::new(self.params());
+            let cavity = compensation::residual(&closing, &design);
+            let layers =
+                Layers { design: &design, machined: &closing, cavity: Some(&cavity), passes: None };
+            tally.add(window, layers)?;
+            let mut light = LightTally::default();
+            if let Some(sight) = sight {
+                sight.add(&mut light, &closing, window, step_mm);
+            }
+            measured.push(Measured { tally, light });
+        }
+        let mut counts = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
+        for row in window.row..window.row_end() {
+            let start = (row - near.row) as usize * near.columns + 1;
+            let line = &reached[start..start + window.columns];
+            for (mask, z) in line.iter().zip(&design.z_mm[start..]) {
+                if !z.is_nan() {
+                    counts[usize::from(*mask)] += 1;
+                }
+            }
+        }
+        Ok((measured, counts, designed))
+    }
+
+    fn closing(&self, around: &Heights, set: &[usize], out: Window) -> Heights {
+        let mut lowest = Heights::empty(out);
+        for &index in set {
+            let closing = compensation::closing(around, &self.candidates[index].profile, out);
+            for (z, other) in lowest.z_mm.iter_mut().zip(&closing.z_mm) {
+                *z = z.min(*other);
+            }
+        }
+        lowest
+    }
+
+    fn reach(&self, set: &[usize], measured: &Measured, designed: &LightTally) -> Reach {
+        let figures = measured.tally.figures();
+        let tools: Vec<&Tool> = set.iter().map(|&index| self.candidates[index].tool).collect();
+        Reach {
+            tools: tools.iter().map(|tool| tool.name.clone()).collect(),
+            cutters: tools.iter().map(|tool| tool.shape.to_string()).collect(),
+            unreachable_fraction: 1.0 - figures.within_limit_fraction.unwrap_or(0.0),
+            cavity_area_fraction: figures.cavity_area_fraction.unwrap_or(0.0),
+            cavity_max_depth_mm: figures.cavity_max_depth_mm.unwrap_or(0.0),
+            normal_p95_deg: figures.normal_p95_deg,
+            light: self.light(designed, &measured.light),
+            refused: set.iter().find_map(|&index| self.candidates[index].refused.clone()),
+        }
+    }
+
+    fn light(&self, designed: &LightTally, machined: &LightTally) -> Option<Light> {
+        let scene = self.part.scene.as_ref()?;
+        let mut points = Vec::new();
+        for tile in self.tiles {
+            let pose = self.part.pose(self.job, &tile.piece)?;
+            points.extend(light::points(&pose, &tile.surface().lattice()));
+        }
+        light::summary(designed, machined, &light::view(scene, &points))
+    }
+
+    /// Which limit breaks first, by how much.
+    fn why_not(&self, cutters: &[Reach]) -> String {
+        let best = cutters
+            .iter()
+            .filter(|reach| reach.refused.is_none())
+            .min_by(|a, b| a.unreachable_fraction.total_cmp(&b.unreachable_fraction));
+        match best {
+            Some(best) => format!(
+                "no set of the library's cutters keeps the limits; the best single one, {}, leaves {:.2} % of the area \
+                 more than {} mm too high, 1 % is allowed; hint: a smaller ball, a stitched dish, or a wider limit",
+                best.tools.join(", "),
+                100.0 * best.unreachable_fraction,
+                self.job.limits.deviation_or_default_mm()
+            ),
+            None => "no cutter of the library can be used on this part; hint: see the findings".into(),
+        }
+    }
+
+    fn write_maps(&self, set: &[usize], out: &Path, progress: &dyn Progress) -> Result<(), Error> {
+        for tile in self.tiles {
+            let surface = tile.surface();
+            let lattice = surface.lattice();
+            let mut map = maps::CavityMap::create(out, &tile.setup.tile.name, &lattice, self.job.maps.full)?;
+            let reach = set.iter().map(|&i| self.candidates[i].profile.reach()).max().unwrap_or(0);
+            for row in blocks(&lattice) {
+                let done: Vec<(Heights, Heights)> = row
+                    .par_iter()
+                    .map(|&window| {
+                        let around = surface.heights(window.grown(2 * reach), surface.top_mm())?;
+                        let design = around.crop(window);
+                        let cavity = compensation::residual(&self.closing(&around, set, window), &design);
+                        progress.advance(window.samples() as u64);
+                        Ok((design, cavity))
+                    })
+                    .collect::<Result<_, Error>>()?;
+                map.push(&done, lattice.columns)?;
+            }
+            let names: Vec<&str> = set.iter().map(|&i| self.candidates[i].tool.name.as_str()).collect();
+            let at = &tile.setup.tile;
+            let note = format!("what {} leave at best, sampled every {} um", names.join(", "), lattice.step_mm * 1e3);
+            map.finish(&self.job.name, [at.x_mm, at.y_mm], note)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_smallest_set_comes_first() {
+        // Cutter 0 reaches 60, cutter 1 50, cutter 2 nothing more; together 0 and 1 reach all.
+        let mut masks = vec![0u64; 8];
+        masks[0b001] = 50;
+        masks[0b011] = 10;
+        masks[0b010] = 40;
+        assert_eq!(sets(&[0, 1, 2], &masks)[0], vec![0, 1]);
+        assert!(sets(&[0, 2], &masks).is_empty());
+        masks[0b100] = 10_000;
+        assert_eq!(sets(&[0, 1, 2], &masks)[0], vec![2]);
+    }
+}
