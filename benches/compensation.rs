@@ -2,6 +2,7 @@
 //! of 10 um; times as multiples of a plain copy of the heights and of the naive loop, all of one
 //! run.
 
+#[allow(dead_code)]
 #[path = "../tests/compensation/surfaces.rs"]
 mod surfaces;
 
@@ -70,7 +71,7 @@ fn main() {
         let profile = Profile::new(text.parse().expect("a cutter"), STEP_MM, 0.0).expect("a profile");
         let naive = naive_ns_per_sample(&facets, &profile);
         let cl = compensation::cutter_location(&facets, &profile, window);
-        let mut time = |what: &str, run: &mut dyn FnMut()| {
+        let time = |what: &str, run: &mut dyn FnMut()| {
             report("facets", text, what, nanoseconds(run) / samples, naive);
         };
         time("CL", &mut || drop(black_box(compensation::cutter_location(&facets, &profile, window))));

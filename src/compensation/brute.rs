@@ -1,3 +1,4 @@
+use super::Profile;
 use super::field::{Field, PAD, TILE, Targets};
 use super::lanes::{LANES, NONE, Vectors, groups, groups_mut, widest};
 use super::pairs::Pairs;
@@ -9,7 +10,7 @@ widest! {
 }
 
 #[inline(always)]
-fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, skip_flat: bool, out: &mut Targets) {
+pub(super) fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, skip_flat: bool, out: &mut Targets) {
     for b in 0..out.rows {
         let shift = pairs.shift(b);
         for tile in (0..out.columns).step_by(TILE) {
@@ -33,4 +34,10 @@ fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, skip_flat: bool, out: &m
             }
         }
     }
+}
+
+/// Groups of lanes that [`every_tap`] takes for these targets.
+pub(super) fn work(profile: &Profile, out: &Targets) -> f64 {
+    let taps = std::f64::consts::PI * profile.radius() * profile.radius();
+    taps * out.rows as f64 * out.columns.div_ceil(LANES) as f64
 }

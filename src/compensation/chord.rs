@@ -11,7 +11,7 @@ widest! {
 }
 
 #[inline(always)]
-fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) {
+pub(super) fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) {
     let levels = (2.0 * reach + 2.0).log2().floor() as usize + 1;
     let length = field.row(-1).len();
     let columns = whole_groups(out.columns);

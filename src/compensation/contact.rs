@@ -10,6 +10,7 @@
 
 use super::Profile;
 use super::ball::{Ball, Reachable};
+use super::brute;
 use super::field::{Field, PAD, Targets};
 use super::lanes::{LANES, Vectors, raise, whole_groups, widest};
 use super::pairs::Pairs;
@@ -23,16 +24,29 @@ const BLOCK: usize = 4 * CELL;
 /// Groups of lanes that a run may cost before it is split.
 const CHEAP: usize = 6;
 
+/// What bounding one run and finding its rows costs, in groups of lanes.
+const RUN_WORK: f64 = 60.0;
+
+/// What looking at far neighbours costs, in groups of lanes.
+const FAR_WORK: f64 = 400.0;
+
 /// Groups of lanes from which a sample's box is worth tightening by far neighbours.
 pub(super) const WIDE: f64 = 100.0;
 
 widest! {
-    /// Raises the targets by every sample of the field that can touch a cutter there.
-    fn contacts<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: &mut Targets) = body
+    /// Raises the targets by every sample of the field that can touch a cutter there, or sets
+    /// `given_up` because taking every sample is less work on such a surface.
+    fn contacts<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: &mut Targets, given_up: &mut bool) = body
 }
 
 #[inline(always)]
-fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: &mut Targets) {
+pub(super) fn body<V: Vectors, P: Pairs>(
+    field: &Field,
+    pairs: &P,
+    profile: &Profile,
+    out: &mut Targets,
+    given_up: &mut bool,
+) {
     let with_y = pairs.is_lattice();
     let mut rises = RowRises::new(field);
     let ball = Ball { radius: profile.radius(), step_mm: profile.step_mm(), slack_mm: pairs.slack_mm() };
@@ -42,12 +56,19 @@ fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: 
         pairs,
         ball,
         alike_mm: (0.4 * ball.step_mm / ball.radius) as f32,
+        work: 0.0,
         starts: Vec::new(),
         known: vec![Known::default(); columns + 2],
         known_blocks: vec![Known::default(); columns.div_ceil(BLOCK / CELL)],
         vectors: PhantomData,
     };
+    let every_tap = brute::work(profile, out);
     for a in 0..field.rows as i64 {
+        let part = a as f64 / field.rows as f64;
+        if part > 0.1 && search.work > part * every_tap {
+            *given_up = true;
+            return;
+        }
         rises.measure(field, a, with_y);
         search.starts.clear();
         for (block, cells) in rises.cells().chunks(BLOCK / CELL).enumerate() {
@@ -84,6 +105,8 @@ struct Search<'a, V: Vectors, P: Pairs> {
     ball: Ball,
     /// Rises that differ by less move a contact by less than a sample.
     alike_mm: f32,
+    /// Done so far, in groups of lanes.
+    work: f64,
     /// Where the last block's contacts lay, by target row: the next block's lie close by.
     starts: Vec<[i32; 2]>,
     /// By cell, from the rows before; the first and last are no cell's.
@@ -191,7 +214,9 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
         at: Reachable,
         out: &mut Targets,
     ) {
+        self.work += RUN_WORK + at.groups() * len as f64;
         let at = if len == 1 && at.groups() > WIDE {
+            self.work += FAR_WORK;
             match self.ball.far_neighbours(self.field, a, PAD + first, at) {
                 Some(at) => at,
                 None => return,

@@ -53,7 +53,10 @@ pub fn rows(h: &Heights, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f3
     let mut order: Vec<usize> = (0..targets.len()).collect();
     order.sort_by(|&i, &j| targets[i].y_mm.total_cmp(&targets[j].y_mm).then(i.cmp(&j)));
     let mut tasks = Vec::new();
-    for batch in order.chunks(BATCH) {
+    // Rows out of each other's reach share nothing, and what lies between would be read for nothing.
+    let apart_mm = 2.0 * profile.radius_mm();
+    let near = order.chunk_by(|&i, &j| targets[j].y_mm - targets[i].y_mm <= apart_mm);
+    for batch in near.flat_map(|near| near.chunks(BATCH)) {
         let longest = batch.iter().map(|&i| targets[i].count).max().unwrap_or(0);
         for from in (0..longest).step_by(TILE_COLUMNS) {
             tasks.push((batch, from));

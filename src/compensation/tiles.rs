@@ -127,9 +127,85 @@ pub(super) fn dilate<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, targ
             return;
         }
     }
-    if profile.is_ball() && profile.radius() >= LEAST_SEARCH {
-        contact::contacts(field, pairs, profile, targets);
-    } else {
+    let mut given_up = !profile.is_ball() || profile.radius() < LEAST_SEARCH;
+    if !given_up {
+        contact::contacts(field, pairs, profile, targets, &mut given_up);
+    }
+    if given_up {
         brute::every_tap(field, pairs, chords, targets);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lanes::{Portable, Vectors};
+    use super::*;
+
+    /// Facets, a hole, and a band of noise.
+    fn surface(window: Window) -> Heights {
+        let mut h = Heights::empty(window);
+        let mut state = 1u32;
+        for (i, z_mm) in h.z_mm.iter_mut().enumerate() {
+            let (x, y) = ((i % window.columns) as f32, (i / window.columns) as f32);
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            let noise = if y > 80.0 { (state >> 16) as f32 * 1e-6 } else { 0.0 };
+            if (x - 30.0).hypot(y - 40.0) > 6.0 {
+                *z_mm = (0.003 * x).min(0.3 - 0.002 * x).min(0.2 - 0.001 * y) + noise;
+            }
+        }
+        h
+    }
+
+    fn bits<V: Vectors>(cutter: &str) -> Vec<u32> {
+        let profile = Profile::new(cutter.parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
+        let stencil = Stencil::new(&profile, 0.0, 0.0);
+        let window = Window { column: 0, row: 0, columns: 123, rows: 97 };
+        let halo = profile.reach() as i64 + 1;
+        let input = window.grown(halo as usize);
+        let pairs = OnSamples {
+            stencil: &stencil,
+            reach: halo - 1,
+            input_rows: input.rows as i64,
+            input_row: input.row,
+            target_row: 0,
+            target_rows: window.rows,
+            every: 1,
+            shift: halo,
+        };
+        let field = Field::of(&surface(window), input, Sense::Raise);
+        let mut ways = Vec::new();
+        let mut done = |fill: &dyn Fn(&mut Targets)| {
+            let mut targets = Targets::new(window.columns, window.rows);
+            fill(&mut targets);
+            for row in 0..window.rows {
+                ways.extend(targets.row(row)[..window.columns].iter().map(|z| z.to_bits()));
+            }
+        };
+        done(&|targets| brute::body::<V, _>(&field, &pairs, false, targets));
+        if profile.is_ball() {
+            done(&|targets| contact::body::<V, _>(&field, &pairs, &profile, targets, &mut false));
+        } else {
+            done(&|targets| chord::body::<V, _>(&field, &pairs, targets, profile.radius()));
+        }
+        ways
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        for cutter in ["ball:0.3", "flat:0.3"] {
+            let portable = bits::<Portable>(cutter);
+            let (all, pruned) = portable.split_at(portable.len() / 2);
+            assert!(all == pruned, "{cutter}");
+            #[cfg(target_arch = "x86_64")]
+            {
+                use super::super::lanes::{Avx2, Avx512};
+                if is_x86_feature_detected!("avx2") {
+                    assert!(bits::<Avx2>(cutter) == portable, "{cutter}");
+                }
+                if is_x86_feature_detected!("avx512f") {
+                    assert!(bits::<Avx512>(cutter) == portable, "{cutter}");
+                }
+            }
+        }
     }
 }
