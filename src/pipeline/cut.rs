@@ -8,6 +8,7 @@ use super::maps::Maps;
 use super::part::Part;
 use super::plan::{self, PostPrograms, TileSetup};
 use super::shop::Shop;
+use super::rescue::{shift, try_candidates};
 use super::{Error, report};
 use crate::compensation::Profile;
 use crate::fidelity::{self, Tally};
@@ -21,7 +22,7 @@ use crate::verify::{Blank, Judged, LateralRapid};
 const SMALLEST_TILE_MM: f64 = 20.0;
 
 /// Cutters tried beyond the job's own on what they leave.
-const CANDIDATES: usize = 2;
+const CANDIDATES: usize = 4;
 
 /// A judged job.
 pub struct Milled {
@@ -149,7 +150,6 @@ fn judged(
         blank,
         posts: &judged,
         cutters: &cutters,
-        candidates: &candidates,
         passes: &posts[0].passes,
         tally: fidelity::Params { step_mm, limit_mm: Some(job.limits.deviation_or_default_mm()) },
         cavities: fidelity::cavities::Params::at_step(step_mm),
@@ -158,7 +158,10 @@ fn judged(
     progress.begin("judge", (lattice.columns * lattice.rows) as u64);
     let offset_mm = tile.piece.origin_mm.z;
     let mut maps = Maps::create(staging, &tile.setup.tile.name, &lattice, job.maps.full, offset_mm)?;
-    let verdict = judge(&case, progress, &mut |strip| maps.push(&strip))?;
+    let mut verdict = judge(&case, progress, &mut |strip| maps.push(&strip))?;
+    progress.begin("smaller cutters", 1);
+    try_candidates(surface, &candidates, &mut verdict.cavities.cavities)?;
+    shift(&mut verdict.cavities.cavities, [tile.setup.tile.x_mm, tile.setup.tile.y_mm]);
     progress.begin("maps", 1);
     let at = &tile.setup.tile;
     let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;

@@ -33,8 +33,6 @@ pub struct Case<'a> {
     pub posts: &'a [Vec<Judged<'a>>],
     /// Every cutter of the job once.
     pub cutters: &'a [Profile],
-    /// Smaller cutters, largest first, that might reach what the job's cutters leave.
-    pub candidates: &'a [Profile],
     pub passes: &'a [ExactPasses],
     pub tally: fidelity::Params,
     pub cavities: cavities::Params,
@@ -151,19 +149,12 @@ impl Case<'_> {
     fn block(&self, window: Window) -> Result<Block, Error> {
         let datum_mm = self.surface.top_mm();
         let lattice = self.surface.lattice();
-        let profiles = self.cutters.iter().chain(self.candidates);
-        let reach = profiles.map(Profile::reach).max().unwrap_or(0);
+        let reach = self.cutters.iter().map(Profile::reach).max().unwrap_or(0);
         let around = self.surface.heights(window.grown((2 * reach).max(1)), datum_mm)?;
         let design = around.crop(window);
         let cavity = self.cavity(&around, &design);
         let passes = self.exact_passes(&around, window);
-        let residuals: Vec<Heights> = self
-            .candidates
-            .iter()
-            .map(|profile| compensation::residual(&compensation::closing(&around, profile, window), &design))
-            .collect();
-        let residuals: Vec<&Heights> = residuals.iter().collect();
-        let labelled = cavities::label(window, &cavity, &residuals, &self.cavities)?;
+        let labelled = cavities::label(window, &cavity, &[], &self.cavities)?;
         let mut block = Block {
             machined: Heights::empty(window),
             tallies: Vec::new(),

@@ -19,6 +19,7 @@ mod pages;
 mod part;
 mod plan;
 mod report;
+mod rescue;
 mod shop;
 
 pub use check::{Checked, Reach, check};
