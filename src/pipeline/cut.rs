@@ -11,6 +11,7 @@ use super::shop::Shop;
 use super::rescue::{shift, try_candidates};
 use super::{Error, report};
 use crate::compensation::Profile;
+use crate::cutter::Shape;
 use crate::fidelity::{self, Tally};
 use crate::job::{Blanks, Job};
 use crate::machine::{self, Setup};
@@ -99,9 +100,19 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
     Ok(setups)
 }
 
+/// The job's cutters that can reach a place which no other of them reaches. A ball is a union of smaller balls, so
+/// of several balls only the smallest counts (on samples its closing is the lowest to 0.25 um at 10 um).
+fn reaching(shop: &Shop) -> Vec<Shape> {
+    let shapes = shop.tools.iter().map(|tool| tool.shape);
+    let is_ball = |shape: &Shape| matches!(shape, Shape::Ball { .. });
+    let balls = shapes.clone().filter(is_ball);
+    let smallest = balls.min_by(|a, b| a.radius_mm().total_cmp(&b.radius_mm()));
+    shapes.filter(|shape| !is_ball(shape) || Some(*shape) == smallest).collect()
+}
+
 /// Profiles of cutters without repetition, in order.
 pub fn distinct(
-    shapes: impl Iterator<Item = crate::cutter::Shape>,
+    shapes: impl Iterator<Item = Shape>,
     step_mm: f64,
 ) -> Result<Vec<Profile>, Error> {
     let mut profiles: Vec<Profile> = Vec::new();
@@ -138,7 +149,7 @@ fn judged(
         .iter()
         .map(|programs| programs.iter().map(|program| program.lateral_rapid(&blank)).collect())
         .collect();
-    let cutters = distinct(shop.tools.iter().map(|tool| tool.shape), step_mm)?;
+    let cutters = distinct(reaching(shop).into_iter(), step_mm)?;
     let (names, candidates) = candidates(shop, step_mm)?;
     let steepest = surface.steepest();
     let sight = match (part.pose(job, &tile.piece), &part.scene) {
