@@ -323,7 +323,13 @@ impl Job {
             ("z_min_mm", part.z_min_mm.is_some(), heights, "heights", leave_out),
             ("z_max_mm", part.z_max_mm.is_some(), heights, "heights", leave_out),
             ("level = \"plane\"", level, !heights, "screen, design or mesh", level_hint),
-            ("level = \"plane\"", level, part.form == Form::Part, "form = \"part\"", "cut the die unlevelled"),
+            (
+                "level = \"plane\"",
+                level,
+                part.form == Form::Part,
+                "form = \"part\"",
+                "cut the die unlevelled",
+            ),
             (
                 "level = \"plane\"",
                 level,

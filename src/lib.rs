@@ -20,10 +20,10 @@
 pub mod catalogue;
 pub mod cutter;
 pub mod grid;
-pub mod tolerance;
 pub mod optics;
 pub mod progress;
 pub mod settings;
+pub mod tolerance;
 
 pub mod screen;
 

@@ -34,13 +34,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     } else {
         println!(
             "{:<14} {:<14} {:>12} {:>10} {:>10} {:>9}  {:>11}",
-            "tool",
-            "cutter",
-            "unreachable",
-            "over 1 um",
-            "deepest",
-            "normals",
-            "on audience"
+            "tool", "cutter", "unreachable", "over 1 um", "deepest", "normals", "on audience"
         );
         for reach in &checked.cutters {
             print(&reach.tools.join("+"), reach);

@@ -28,9 +28,13 @@ pub struct Arguments {
 enum Misused {
     #[error("programs do not say which machine runs them; hint: --machine NAME, see screenmill machines")]
     NoMachine,
-    #[error("{job} is a job, and {others} other files stand beside it; hint: one job at a time, or programs only")]
+    #[error(
+        "{job} is a job, and {others} other files stand beside it; hint: one job at a time, or programs only"
+    )]
     Mixed { job: String, others: usize },
-    #[error("--machine {machine} stands beside a job, which names its own machine; hint: leave --machine out")]
+    #[error(
+        "--machine {machine} stands beside a job, which names its own machine; hint: leave --machine out"
+    )]
     MachineOfJob { machine: String },
 }
 

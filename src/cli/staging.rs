@@ -51,7 +51,8 @@ impl Staging {
 /// Whether a folder holds no file, at any depth.
 fn is_empty(path: &Path) -> bool {
     path.is_dir()
-        && fs::read_dir(path).is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(|e| is_empty(&e.path()))))
+        && fs::read_dir(path)
+            .is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(|e| is_empty(&e.path()))))
 }
 
 impl Drop for Staging {

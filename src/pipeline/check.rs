@@ -191,7 +191,10 @@ fn sets(usable: &[usize], masks: &[u64]) -> Vec<Vec<usize>> {
         })
         .collect();
     found.sort_by_key(|set| (set.count_ones(), std::cmp::Reverse(*set)));
-    found.into_iter().map(|set| usable.iter().copied().filter(|index| set >> index & 1 == 1).collect()).collect()
+    found
+        .into_iter()
+        .map(|set| usable.iter().copied().filter(|index| set >> index & 1 == 1).collect())
+        .collect()
 }
 
 /// The part and the cutters that are tried on it.
@@ -286,8 +289,7 @@ impl Facts<'_> {
             }
             let mut tally = Tally::new(self.params());
             let cavity = compensation::residual(&closing, &design);
-            let layers =
-                Layers { design: &design, machined: &closing, cavity: Some(&cavity), passes: None };
+            let layers = Layers { design: &design, machined: &closing, cavity: Some(&cavity), passes: None };
             tally.add(window, layers)?;
             let mut light = LightTally::default();
             if let Some(sight) = sight {
@@ -383,7 +385,11 @@ impl Facts<'_> {
             }
             let names: Vec<&str> = set.iter().map(|&i| self.candidates[i].tool.name.as_str()).collect();
             let at = &tile.setup.tile;
-            let note = format!("what {} leave at best, sampled every {} um", names.join(", "), lattice.step_mm * 1e3);
+            let note = format!(
+                "what {} leave at best, sampled every {} um",
+                names.join(", "),
+                lattice.step_mm * 1e3
+            );
             map.finish(&self.job.name, [at.x_mm, at.y_mm], note)?;
         }
         Ok(())

@@ -7,8 +7,8 @@ use super::light::Sight;
 use super::maps::Maps;
 use super::part::Part;
 use super::plan::{self, PostPrograms, TileSetup};
-use super::shop::Shop;
 use super::rescue::{shift, try_candidates};
+use super::shop::Shop;
 use super::{Error, report};
 use crate::compensation::Profile;
 use crate::cutter::Shape;
@@ -111,10 +111,7 @@ fn reaching(shop: &Shop) -> Vec<Shape> {
 }
 
 /// Profiles of cutters without repetition, in order.
-pub fn distinct(
-    shapes: impl Iterator<Item = Shape>,
-    step_mm: f64,
-) -> Result<Vec<Profile>, Error> {
+pub fn distinct(shapes: impl Iterator<Item = Shape>, step_mm: f64) -> Result<Vec<Profile>, Error> {
     let mut profiles: Vec<Profile> = Vec::new();
     for shape in shapes {
         if !profiles.iter().any(|profile| profile.shape() == shape) {
@@ -228,10 +225,8 @@ fn candidates(shop: &Shop, step_mm: f64) -> Result<(Vec<String>, Vec<Profile>), 
     });
     tools.sort_by(|a, b| b.shape.radius_mm().total_cmp(&a.shape.radius_mm()).then(a.name.cmp(&b.name)));
     tools.truncate(CANDIDATES);
-    let profiles = tools
-        .iter()
-        .map(|tool| Profile::new(tool.shape, step_mm, 0.0))
-        .collect::<Result<Vec<_>, _>>()?;
+    let profiles =
+        tools.iter().map(|tool| Profile::new(tool.shape, step_mm, 0.0)).collect::<Result<Vec<_>, _>>()?;
     Ok((tools.iter().map(|tool| tool.name.clone()).collect(), profiles))
 }
 

@@ -37,7 +37,9 @@ pub enum Error {
     Report(#[from] crate::report::Error),
     #[error(transparent)]
     Cutter(#[from] crate::cutter::ParseError),
-    #[error("the inline cutter \"{tool}\" has no {key}; hint: write {key} beside it, or name a tool of the library")]
+    #[error(
+        "the inline cutter \"{tool}\" has no {key}; hint: write {key} beside it, or name a tool of the library"
+    )]
     InlineFeed { tool: String, key: &'static str },
     #[error("post names \"{name}\" twice")]
     PostTwice { name: String },

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use super::Error;
 use super::judge::Strip;
 use crate::grid::{Heights, Lattice, Window};
+use crate::report::MapFiles;
 use crate::report::maps::{self, MapRow, Reducer};
 use crate::report::picture::{self, Caption, Kind, Preview};
-use crate::report::MapFiles;
 use crate::surface::HeightWriter;
 
 /// The maps of a tile while they are written: z in the part's frame.
@@ -30,8 +30,7 @@ impl Maps {
         offset_mm: f64,
     ) -> Result<Maps, Error> {
         let folder = staging.join("maps");
-        std::fs::create_dir_all(&folder)
-            .map_err(|source| Error::Output { path: folder.clone(), source })?;
+        std::fs::create_dir_all(&folder).map_err(|source| Error::Output { path: folder.clone(), source })?;
         let (columns, rows) = (lattice.columns, lattice.rows);
         let reducer = match full {
             true => Reducer::by_factor(columns, rows, 1),
@@ -81,12 +80,8 @@ impl Maps {
         }
         let factor = self.reducer.factor();
         for kind in Kind::ALL {
-            let caption = Caption {
-                part: part.into(),
-                tile: self.tile.clone(),
-                origin_mm,
-                notes: notes.to_vec(),
-            };
+            let caption =
+                Caption { part: part.into(), tile: self.tile.clone(), origin_mm, notes: notes.to_vec() };
             let path = self.folder.join(format!("{}-{}.png", self.tile, kind.name()));
             picture::write_png(&path, &self.preview.draw(kind, &caption))?;
         }
@@ -148,8 +143,7 @@ impl CavityMap {
     /// Gives the map its name and draws it.
     pub fn finish(self, part: &str, origin_mm: [f64; 2], note: String) -> Result<(), Error> {
         self.writer.finish()?;
-        let caption =
-            Caption { part: part.into(), tile: self.tile.clone(), origin_mm, notes: vec![note] };
+        let caption = Caption { part: part.into(), tile: self.tile.clone(), origin_mm, notes: vec![note] };
         let path = self.folder.join(format!("{}-cavity.png", self.tile));
         Ok(picture::write_png(&path, &self.preview.draw(Kind::Cavity, &caption))?)
     }

@@ -179,7 +179,9 @@ fn sheet_tile(job: &Job, shop: &Shop, result: &TileResult) -> SheetTile {
     }
     let mut notes = Vec::new();
     if job.stock.blanks == Blanks::One {
-        notes.push("One sheet for all tiles: move it, not the cutter, and find this tile's corner anew.".into());
+        notes.push(
+            "One sheet for all tiles: move it, not the cutter, and find this tile's corner anew.".into(),
+        );
     }
     let depth_mm = tile.allowance_mm + tile.surface().top_mm() - tile.surface().bottom_mm();
     SheetTile {
@@ -195,9 +197,7 @@ fn sheet_tile(job: &Job, shop: &Shop, result: &TileResult) -> SheetTile {
             .setup
             .obstacles
             .iter()
-            .map(|o| {
-                [o.bounds.low_mm[0], o.bounds.low_mm[1], o.bounds.high_mm[0], o.bounds.high_mm[1]]
-            })
+            .map(|o| [o.bounds.low_mm[0], o.bounds.low_mm[1], o.bounds.high_mm[0], o.bounds.high_mm[1]])
             .collect(),
         wcs: job.machine.wcs.clone(),
         xy_zero: shop.fixture.wcs_found.clone(),

@@ -162,12 +162,10 @@ impl Part {
                 // A die is the part seen from behind: its left tile is the part's right one.
                 let x_mm = if die { self.size_mm()[0] - tile.x_mm - tile.width_mm } else { tile.x_mm };
                 let (c0, r0) = (design.core.c0 + count(x_mm), design.core.r0 + count(tile.y_mm));
-                let own =
-                    CellRange { c0, r0, c1: c0 + count(tile.width_mm), r1: r0 + count(tile.height_mm) };
+                let own = CellRange { c0, r0, c1: c0 + count(tile.width_mm), r1: r0 + count(tile.height_mm) };
                 let material = if one_sheet { design.core } else { own };
                 let size_mm = [tile.width_mm, tile.height_mm];
-                let piece =
-                    Designed::new(Arc::clone(design), material, [x_mm, tile.y_mm], size_mm, step_mm)?;
+                let piece = Designed::new(Arc::clone(design), material, [x_mm, tile.y_mm], size_mm, step_mm)?;
                 let piece: Arc<dyn Surface> = if job.part.level == Level::Plane {
                     let level = piece.levelled()?;
                     wedge_deg = [level.about_x_deg, level.about_y_deg];
@@ -239,6 +237,5 @@ impl Part {
 }
 
 fn undercuts(level: &surface::Level) -> Option<Undercuts> {
-    (level.undercuts > 0)
-        .then_some(Undercuts { faces: level.undercuts, area_mm2: level.undercut_area_mm2 })
+    (level.undercuts > 0).then_some(Undercuts { faces: level.undercuts, area_mm2: level.undercut_area_mm2 })
 }

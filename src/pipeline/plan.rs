@@ -4,10 +4,10 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use super::Error;
 use super::judge::ExactPasses;
 use super::part::TileSurface;
 use super::shop::Shop;
-use super::Error;
 use crate::compensation::Profile;
 use crate::cutter::Shape;
 use crate::job::{self, Job, ZZero};
@@ -128,12 +128,8 @@ pub fn programs(
         unit_mm: dialect.unit_mm,
         budget,
     };
-    let mut planned = PostPrograms {
-        dialect: dialect.name.clone(),
-        budget,
-        programs: Vec::new(),
-        passes: Vec::new(),
-    };
+    let mut planned =
+        PostPrograms { dialect: dialect.name.clone(), budget, programs: Vec::new(), passes: Vec::new() };
     for (index, operation) in job.operations.iter().enumerate() {
         let tool = &shop.tools[index];
         let refused = |source| Error::Toolpath {
@@ -204,14 +200,7 @@ pub fn programs(
 }
 
 /// `programs/<tile>-<nn>-<operation>-<tool>.<ext>`, in a folder for each post where there are several.
-fn program_file(
-    job: &Job,
-    shop: &Shop,
-    tile: &str,
-    dialect: &Dialect,
-    index: usize,
-    tool: &Tool,
-) -> PathBuf {
+fn program_file(job: &Job, shop: &Shop, tile: &str, dialect: &Dialect, index: usize, tool: &Tool) -> PathBuf {
     let tool = tool.name.replace(':', "-");
     let kind = job.operations[index].kind.word();
     let name = format!("{tile}-{:02}-{kind}-{tool}.{}", index + 1, dialect.extension);

@@ -10,8 +10,8 @@ use super::{Error, light, pages};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
 use crate::job::{Form, Job};
-use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
 use crate::report::cavity_list::{self, TileCavities};
+use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
 use crate::tolerance::Budget;
 use crate::verify::ProgramCut;
 
@@ -120,12 +120,7 @@ fn of_shop(job: &Job, shop: &Shop, part: &Part) -> Vec<Finding> {
 }
 
 /// What a tile shows, with the programs that must not be run moved to `rejected/`.
-fn of_tile(
-    job: &Job,
-    shop: &Shop,
-    result: &mut TileResult,
-    staging: &Path,
-) -> Result<Vec<Finding>, Error> {
+fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> Result<Vec<Finding>, Error> {
     let name = result.tile.setup.tile.name.clone();
     let gouge_limit_mm = job.limits.gouge_or_default_mm();
     let mut found = Vec::new();
@@ -191,7 +186,8 @@ fn of_motions(job: &Job, shop: &Shop, result: &TileResult, post: usize, index: u
         found.push(finding(Severity::Error, "travel", format!("{file}: {refusal}")).on(name));
     }
     if let Some(bite) = cut.rapid {
-        let message = format!("{file}:{}: a rapid goes {:.4} mm deep through the stock", bite.line, bite.depth_mm);
+        let message =
+            format!("{file}:{}: a rapid goes {:.4} mm deep through the stock", bite.line, bite.depth_mm);
         let place = result.in_part([bite.at_mm[0], bite.at_mm[1]]);
         found.push(finding(Severity::Error, "rapid-through-stock", message).on(name).at(&place));
     }
@@ -260,11 +256,7 @@ fn tile(job: &Job, shop: &Shop, result: &TileResult) -> report::Tile {
                 rapid_mm: program.extent.rapid_mm,
                 time_s: program.timing.total_s,
                 deepest_bite_mm: cut.deepest_bite_mm(),
-                bounds_mm: Bounds {
-                    x: [low[0], high[0]],
-                    y: [low[1], high[1]],
-                    z: [low[2], high[2]],
-                },
+                bounds_mm: Bounds { x: [low[0], high[0]], y: [low[1], high[1]], z: [low[2], high[2]] },
             });
         }
     }
@@ -332,7 +324,9 @@ fn of_limits(job: &Job, report: &Report, figures: &Figures) -> Vec<Finding> {
     if let (Some(limit_deg), Some(normal_deg)) = (limits.normal_p95_deg, figures.normal_p95_deg)
         && normal_deg > limit_deg
     {
-        let message = format!("5 % of the normals are off by more than {normal_deg:.2} degrees, {limit_deg} are allowed");
+        let message = format!(
+            "5 % of the normals are off by more than {normal_deg:.2} degrees, {limit_deg} are allowed"
+        );
         miss("normals", message);
     }
     if let (Some(least), Some(light)) = (limits.on_audience_min, &report.light)

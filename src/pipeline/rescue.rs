@@ -40,10 +40,8 @@ fn leaves(surface: &dyn Surface, profile: &Profile, cavity: &Cavity) -> Result<f
     }
     let Some([low_mm, high_mm]) = cavity.outline.bounds_mm() else { return Ok(here_mm) };
     let (column, row) = (index(low_mm[0]), index(low_mm[1]));
-    let (columns, rows) = (
-        (index(high_mm[0]) - column + 1).max(1) as usize,
-        (index(high_mm[1]) - row + 1).max(1) as usize,
-    );
+    let (columns, rows) =
+        ((index(high_mm[0]) - column + 1).max(1) as usize, (index(high_mm[1]) - row + 1).max(1) as usize);
     let mut most_mm = here_mm;
     for start_row in (0..rows).step_by(PIECE) {
         for start_column in (0..columns).step_by(PIECE) {
@@ -65,10 +63,7 @@ fn leaves(surface: &dyn Surface, profile: &Profile, cavity: &Cavity) -> Result<f
 /// The most that a cutter leaves over a window, in mm.
 fn residual(surface: &dyn Surface, profile: &Profile, window: Window) -> Result<f64, Error> {
     let around = surface.heights(window.grown(2 * profile.reach()), surface.top_mm())?;
-    let left = compensation::residual(
-        &compensation::closing(&around, profile, window),
-        &around.crop(window),
-    );
+    let left = compensation::residual(&compensation::closing(&around, profile, window), &around.crop(window));
     Ok(left.z_mm.iter().filter(|z| z.is_finite()).fold(0.0, |most, z| f64::from(*z).max(most)))
 }
 
