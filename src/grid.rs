@@ -86,7 +86,7 @@ impl Window {
         let row = self.row.max(other.row);
         let columns = self.column_end().min(other.column_end()) - column;
         let rows = self.row_end().min(other.row_end()) - row;
-        (columns > 0 && rows > 0).then(|| Window {
+        (columns > 0 && rows > 0).then_some(Window {
             column,
             row,
             columns: columns as usize,

@@ -3,8 +3,8 @@
 //! Every stage that gives way below the exact cutter location takes its share from here, and what
 //! a place needs beyond its share is paid by lifting the cutter there, never by gouging.
 
-/// How far above the exact cutter location a simplified pass may run, besides one unit of the
-/// controller's grid, in mm: it lets one move follow a facet whose heights are not on the grid.
+/// How far above the exact cutter location a simplified pass may run, besides what a unit of the
+/// controller's grid takes beyond the simplification's share, in mm: it lets one move follow a facet whose heights are not on the grid.
 pub const EXCESS_MM: f64 = 0.0005;
 
 /// Most of the budget that simplification may use, in mm. More would tilt mirrors for little gain:

@@ -178,12 +178,17 @@ fn of_motions(job: &Job, shop: &Shop, result: &TileResult, post: usize, index: u
     let mut found = Vec::new();
     let tool = &shop.tools[program.operation];
     let bounds = plan::bounds_over_stock(&program.extent, tile);
-    let radius_mm = tool
-        .cylinders(shop.machine.spindle.nose_diameter_mm)
-        .iter()
-        .fold(tool.shape.radius_mm(), |widest, cylinder| widest.max(cylinder.radius_mm));
-    if let Err(refusal) = tile.setup.check(&bounds, radius_mm, job.machine.clearance_mm, &shop.machine) {
-        found.push(finding(Severity::Error, "travel", format!("{file}: {refusal}")).on(name));
+    // The cutter from its tip up, then shank and holder from where they begin.
+    let body = tool.cylinders(shop.machine.spindle.nose_diameter_mm);
+    let columns = body.iter().map(|cylinder| (cylinder.radius_mm, cylinder.from_mm));
+    for (radius_mm, from_mm) in std::iter::once((tool.shape.radius_mm(), 0.0)).chain(columns) {
+        let mut raised = bounds;
+        raised.low_mm[2] += from_mm;
+        let checked = tile.setup.check(&raised, radius_mm, job.machine.clearance_mm, &shop.machine);
+        if let Err(refusal) = checked {
+            found.push(finding(Severity::Error, "travel", format!("{file}: {refusal}")).on(name));
+            break;
+        }
     }
     if let Some(bite) = cut.rapid {
         let message =

@@ -211,7 +211,8 @@ fn joints(
 /// The cuts of one pass, towards higher coordinates.
 fn pass(site: &Site, params: &Params, layout: &Layout, envelope: &Envelope) -> Vec<Run> {
     let simplify = site.budget.simplify_mm / site.unit_mm;
-    let excess = 1.0 + EXCESS_MM / site.unit_mm;
+    // With what simplification may take below, a whole unit always lies between the bounds.
+    let excess = (1.0 - simplify).max(0.0) + EXCESS_MM / site.unit_mm;
     let mut out = Vec::new();
     let mut i = 0;
     while i < layout.count {
