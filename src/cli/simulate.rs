@@ -14,7 +14,7 @@ use screenmill::verify::{
 };
 use serde_json::{Value, json};
 
-use super::console::{Console, listen_for_interrupt};
+use super::console::Console;
 use super::program::{bounds, clock, read};
 use super::{Common, Outcome, Refusal};
 
@@ -101,7 +101,6 @@ struct Program {
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
-    listen_for_interrupt()?;
     let console = Console::new(common.quiet, common.verbose);
     let judgement = judge(arguments, &console)?;
     console.times();

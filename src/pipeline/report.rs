@@ -364,7 +364,7 @@ fn simulate(shop: &Shop, result: &TileResult) -> String {
     let command = format!(
         "screenmill simulate {} --cutter {} --part {{out}}/maps/{name}-design.tif --zero 0 0 {:.6} --stock-top-mm {:.6} --machine {} --out {{out}}/simulate-{name}",
         files.join(" "),
-        cutters.join(","),
+        cutters.join(" "),
         top_mm + tile.z_zero_mm,
         top_mm + tile.allowance_mm,
         shop.machine.name

@@ -1,0 +1,238 @@
+//! `mill` as a shop floor uses it: what it writes, what it says and how it ends.
+
+mod job;
+
+use job::{Bench, figure, programs};
+use predicates::prelude::*;
+use predicates::str::contains;
+use serde_json::Value;
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().expect("an object").keys().map(String::as_str).collect()
+}
+
+fn codes(report: &Value) -> Vec<&str> {
+    let findings = report["findings"].as_array().expect("findings");
+    findings.iter().map(|finding| finding["code"].as_str().expect("a code")).collect()
+}
+
+#[test]
+fn a_job_leaves_its_files_and_nothing_else() {
+    let bench = Bench::with(&[]);
+    bench.run("mill job.toml --out out --quiet").success().stdout(
+        contains("verdict   pass; out/report.html")
+            .and(contains("check     screenmill simulate out/programs/")),
+    );
+    let names: Vec<String> = bench.files("out").into_keys().collect();
+    let maps = ["cavity", "design", "deviation", "machined"];
+    let mut want: Vec<String> = maps
+        .iter()
+        .flat_map(|map| ["png", "tif"].map(|kind| format!("maps/r0c0-{map}.{kind}")))
+        .chain(
+            ["cavities.csv", "cavities.geojson", "report.html", "report.json", "run.json"].map(String::from),
+        )
+        .chain(["setup-sheet.html", "programs/r0c0-01-rough-flat-3.ngc"].map(String::from))
+        .chain(["programs/r0c0-02-finish-ball-1.ngc".to_string()])
+        .collect();
+    want.sort();
+    assert_eq!(names, want);
+}
+
+#[test]
+fn the_report_has_the_keys_of_the_contract_in_their_order() {
+    let bench = Bench::with(&[]);
+    let report = bench.mill(0);
+    let top = ["schema", "screenmill", "verdict", "part", "tiles", "fidelity", "light", "time_s", "findings"];
+    assert_eq!(keys(&report), top);
+    assert_eq!(keys(&report["part"]), ["width_mm", "height_mm", "columns", "rows", "step_mm", "z_min_mm"]);
+    let tile = &report["tiles"][0];
+    let want = [
+        "name",
+        "row",
+        "column",
+        "x_mm",
+        "y_mm",
+        "width_mm",
+        "height_mm",
+        "z_range_mm",
+        "program_zero_mm",
+        "wedge_deg",
+        "programs",
+        "maps",
+        "fidelity",
+    ];
+    assert_eq!(keys(tile), want);
+    let want = [
+        "file",
+        "post",
+        "operation",
+        "tool",
+        "cutter",
+        "blocks",
+        "bytes",
+        "cutting_mm",
+        "rapid_mm",
+        "time_s",
+        "deepest_bite_mm",
+        "bounds_mm",
+    ];
+    assert_eq!(keys(&tile["programs"][0]), want);
+    assert_eq!(keys(&tile["programs"][0]["bounds_mm"]), ["x", "y", "z"]);
+    assert_eq!(keys(&tile["maps"]), ["design", "machined", "deviation", "cavity"]);
+    let want = [
+        "gouge_max_mm",
+        "gouge_budget_mm",
+        "excess_max_mm",
+        "deviation_p50_mm",
+        "deviation_p99_mm",
+        "within_limit_fraction",
+        "normal_p50_deg",
+        "normal_p95_deg",
+        "cavity_area_fraction",
+        "cavity_max_depth_mm",
+        "cavities",
+        "by_cause",
+    ];
+    assert_eq!(keys(&report["fidelity"]), want);
+    assert_eq!(keys(&tile["fidelity"]), want);
+    assert_eq!(
+        keys(&report["fidelity"]["gouge_budget_mm"]),
+        ["raster", "simplify", "rounding", "controller"]
+    );
+    assert_eq!(keys(&report["fidelity"]["by_cause"]), ["unreachable", "scallop", "rounding"]);
+    assert_eq!(keys(&report["time_s"]), ["total", "by_operation", "by_tool"]);
+    assert_eq!(report["part"]["columns"], 200);
+    assert!(figure(&report, "gouge_max_mm") <= 0.002);
+    let time: f64 =
+        tile["programs"].as_array().expect("programs").iter().filter_map(|p| p["time_s"].as_f64()).sum();
+    assert!((report["time_s"]["total"].as_f64().expect("a time") - time).abs() < 1e-9);
+}
+
+#[test]
+fn files_of_the_report_stand_beside_it_and_sort_as_they_run() {
+    let bench = Bench::with(&[(
+        "name = \"linuxcnc-mill\"",
+        "name = \"roland-egx-600\"\npost = [\"rml1\", \"grbl\"]",
+    )]);
+    let report = bench.mill(0);
+    let files = programs(&report);
+    assert_eq!(files.len(), 4);
+    assert!(files[..2].iter().all(|file| file.starts_with("programs/rml1/")), "{files:?}");
+    assert!(files[2..].iter().all(|file| file.starts_with("programs/grbl/")), "{files:?}");
+    assert!(files[..2].is_sorted() && files[2..].is_sorted(), "{files:?}");
+    let maps = report["tiles"][0]["maps"].as_object().expect("maps").values();
+    for file in files.iter().map(String::as_str).chain(maps.map(|map| map.as_str().expect("a path"))) {
+        assert!(bench.path("out").join(file).is_file(), "{file}");
+    }
+    assert!(codes(&report).contains(&"dialect"), "{report}");
+}
+
+#[test]
+fn neither_threads_nor_a_second_run_change_a_byte() {
+    let bench = Bench::with(&[]);
+    let run = |line: &str, out: &str| {
+        bench.run(line).success();
+        let mut files = bench.files(out);
+        files.remove("run.json").expect("clocks go there");
+        files
+    };
+    let one = run("mill job.toml --out out --quiet --threads 1", "out");
+    let two = run("mill job.toml --out out --quiet --threads 2", "out");
+    let elsewhere = run("mill job.toml --out other --quiet", "other");
+    assert!(one.len() == 15 && one == two);
+    assert!(one == elsewhere);
+}
+
+#[test]
+fn a_missed_limit_ends_with_1_and_is_named() {
+    let limit = "gouge_mm = 0.002";
+    let cases = [
+        ("hours_max = 0.001", "hours"),
+        ("deviation_mm = 0.0005", "deviation"),
+        ("normal_p95_deg = 0.1", "normal"),
+        ("on_audience_min = 0.999", "audience"),
+    ];
+    for (key, word) in cases {
+        let bench = Bench::with(&[(limit, &format!("{limit}\n{key}"))]);
+        let report = bench.mill(1);
+        assert_eq!(report["verdict"], "fail");
+        assert!(codes(&report).iter().any(|code| code.contains(word)), "{key}: {:?}", codes(&report));
+        assert!(bench.path("out/programs/r0c0-02-finish-ball-1.ngc").is_file(), "nothing gouges");
+    }
+}
+
+#[test]
+fn a_refusal_leaves_nothing_and_spares_what_was_there() {
+    let bench = Bench::with(&[("ball-1", "ball-9")]);
+    bench.run("mill job.toml --out out --quiet").code(2).stdout("");
+    assert!(!bench.path("out").exists());
+    bench.job("job.toml", &[]);
+    bench.mill(0);
+    bench.write("out/mine.txt", "mine");
+    let before = bench.files("out");
+    bench.job("job.toml", &[("thickness_mm = 10", "thickness_mm = 2.5")]);
+    bench.run("mill job.toml --out out --quiet").code(2);
+    assert!(bench.files("out") == before);
+}
+
+#[test]
+fn a_second_job_replaces_the_first_and_spares_other_files() {
+    let bench = Bench::with(&[]);
+    bench.mill(0);
+    bench.write("out/mine.txt", "mine");
+    bench.job("job.toml", &[("tool = \"ball-1\"", "tool = \"ball-2\"")]);
+    let report = bench.mill(0);
+    let files = bench.files("out");
+    assert_eq!(files["mine.txt"], b"mine");
+    let kept: Vec<&String> = files.keys().filter(|name| name.starts_with("programs/")).collect();
+    assert_eq!(kept, programs(&report).iter().collect::<Vec<_>>());
+    assert_eq!(kept[1], "programs/r0c0-02-finish-ball-2.ngc");
+}
+
+#[test]
+fn json_is_one_object_and_the_report() {
+    let bench = Bench::with(&[]);
+    let output = bench.run("mill job.toml --out out --json").success().get_output().stdout.clone();
+    let report: Value = serde_json::from_slice(&output).expect("one JSON object");
+    assert_eq!(report, bench.json("out/report.json"));
+}
+
+#[test]
+fn every_way_to_cut_keeps_the_limit() {
+    let finish = "tool = \"ball-1\"\nstepover_mm = 0.1";
+    let cases: [(&str, &str, &str); 9] = [
+        ("wall", "step_mm = 0.02", "step_mm = 0.02\nedge = \"wall\""),
+        ("die", "step_mm = 0.02", "step_mm = 0.02\nform = \"die\""),
+        ("part-top", "min_floor_mm = 2", "min_floor_mm = 2\nz_zero = \"part-top\""),
+        ("along y", finish, "tool = \"ball-1\"\nstepover_mm = 0.1\ndirection_deg = 90"),
+        ("climb", finish, "tool = \"ball-1\"\nstepover_mm = 0.1\npattern = \"one-way\""),
+        ("scallop", finish, "tool = \"ball-1\"\nscallop_mm = 0.002"),
+        ("bull", finish, "tool = \"bull-2\"\nstepover_mm = 0.1"),
+        ("level", "step_mm = 0.02", "step_mm = 0.02\nlevel = \"plane\""),
+        ("full", "[limits]", "[maps]\nfull = true\n[limits]"),
+    ];
+    for (name, from, to) in cases {
+        let bench = Bench::with(&[(from, to)]);
+        let report = bench.mill(0);
+        assert!(figure(&report, "gouge_max_mm") <= 0.002, "{name}: {report}");
+        assert!(figure(&report, "deviation_p50_mm") < 0.01, "{name}: {report}");
+        let top = if name == "part-top" { 0.0 } else { 0.2 };
+        let zero = report["tiles"][0]["program_zero_mm"][2].as_f64().expect("a height");
+        assert!(name == "level" || (zero - top).abs() < 1e-9, "{name}: {zero}");
+        assert_eq!(report.get("light").is_none_or(Value::is_null), name == "die", "{name}");
+    }
+}
+
+#[test]
+fn a_wall_is_not_cut_and_an_open_edge_is() {
+    let low = |edge: &str| {
+        let bench = Bench::with(&[("step_mm = 0.02", &format!("step_mm = 0.02\nedge = \"{edge}\""))]);
+        let report = bench.mill(0);
+        report["tiles"][0]["programs"][1]["bounds_mm"]["x"][0].as_f64().expect("a bound")
+    };
+    // Against a wall the ball's axis stays a radius inside; an open edge is overrun.
+    assert!(low("open") < 0.0);
+    let bench = Bench::with(&[("step_mm = 0.02", "step_mm = 0.02\nedge = \"wall\"")]);
+    let report = bench.mill(0);
+    assert!(figure(&report, "cavity_area_fraction") > 0.05, "the wall keeps the ball off the edge: {report}");
+}
