@@ -58,14 +58,6 @@ fn four_setups_of_one_sheet_cut_what_one_cuts() {
     // Passes are the same; each is simplified from its own first point, within the gouge's budget.
     let deeper = machined.iter().copied().fold(0.0, |most: f64, d| most.max(-d));
     assert!(deeper < 0.002, "four setups cut {deeper} mm deeper");
-    let beyond = machined.iter().filter(|d| d.abs() > 0.002).count();
-    // A ball that a neighbour's wall holds up reaches the seam's foot from further out than the overrun goes:
-    // some samples beside a seam keep metal. They are less than 0.1 % of the sheet, and all are beside a seam.
-    assert!(beyond * 1000 < machined.len(), "{beyond} samples");
-    let seam = SIDE as i64 / 2;
-    for (i, d) in machined.iter().enumerate().filter(|(_, d)| d.abs() > 0.002) {
-        let (row, column) = ((i / SIDE) as i64, (i % SIDE) as i64);
-        let away = (row - seam).abs().min((column - seam).abs());
-        assert!(away <= 25, "{d} mm at row {row}, column {column}");
-    }
+    let higher = machined.iter().copied().fold(0.0, f64::max);
+    assert!(higher < 0.002, "four setups leave {higher} mm more");
 }

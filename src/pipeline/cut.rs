@@ -67,8 +67,7 @@ pub fn mill(job: &Job, folder: &Path, staging: &Path, progress: &dyn Progress) -
 /// The tiles of a part, each checked against machine, blank and cutters before anything is planned.
 pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Error> {
     let steepest = part.whole.steepest();
-    let step_mm = job.part.step_mm;
-    let overruns = shop.tools.iter().map(|tool| plan::overrun_mm(&tool.shape, steepest, step_mm));
+    let overruns = shop.tools.iter().map(|tool| plan::overrun_mm(job, &tool.shape, steepest));
     let overrun_mm = overruns.fold(0.0, f64::max);
     let part_top_mm = part.whole.top_mm();
     let size_mm = part.size_mm();

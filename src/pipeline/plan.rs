@@ -94,8 +94,13 @@ fn contact_radius_mm(shape: &Shape, slope: f64) -> f64 {
 }
 
 /// How far past the tile's edges an operation may go.
-pub fn overrun_mm(shape: &Shape, steepest: [f64; 2], step_mm: f64) -> f64 {
-    contact_radius_mm(shape, steepest[0].max(steepest[1])) + 3.0 * step_mm
+pub fn overrun_mm(job: &Job, shape: &Shape, steepest: [f64; 2]) -> f64 {
+    let slope = steepest[0].max(steepest[1]);
+    let reach_mm = match job.stock.blanks {
+        job::Blanks::PerTile => contact_radius_mm(shape, slope),
+        job::Blanks::One => shape.radius_mm(),
+    };
+    reach_mm + 3.0 * job.part.step_mm
 }
 
 /// Plans, writes and reads back every operation of a tile in one dialect; files go under `folder`, the job's staging
@@ -121,6 +126,7 @@ pub fn programs(
     let site = Site {
         surface,
         origin_mm: [tile.setup.tile.x_mm, tile.setup.tile.y_mm],
+        neighbours: job.stock.blanks == job::Blanks::One,
         margin_mm: job.stock.margin_mm,
         top_allowance_mm: tile.allowance_mm,
         z_zero_mm: tile.z_zero_mm,
@@ -150,7 +156,7 @@ pub fn programs(
                 let later = &shop.tools[index + 1..];
                 let clear_mm = later
                     .iter()
-                    .map(|tool| tool.shape.radius_mm() + overrun_mm(&tool.shape, steepest, lattice.step_mm))
+                    .map(|tool| tool.shape.radius_mm() + overrun_mm(job, &tool.shape, steepest))
                     .fold(0.0, f64::max);
                 let params = rough::Params {
                     shape: tool.shape,

@@ -82,9 +82,14 @@ pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
     if stepover < 1.0 {
         return Err(Error::StepoverUnit { stepover_mm: spacing_mm, unit_mm: site.unit_mm, hint });
     }
-    // Past an open edge as far as the cutter can touch the border's steepest face.
+    // Past an open edge as far as the cutter can touch the border's steepest face; past a neighbour's as far as it
+    // reaches at all, since a step of the neighbour can keep it that far out.
     let past = 2.0 * site.surface.lattice().step_mm;
-    let overrun_mm = [slope_along, slope_across].map(|slope| contact_radius_mm(&params.shape, slope) + past);
+    let reach_mm = |slope: f64| match site.neighbours {
+        true => params.shape.radius_mm(),
+        false => contact_radius_mm(&params.shape, slope),
+    };
+    let overrun_mm = [slope_along, slope_across].map(|slope| reach_mm(slope) + past);
     site.validate(overrun_mm[0].max(overrun_mm[1]) + spacing_mm + diameter_mm)?;
     Ok(Layout::covering(site, along, stepover as i32, overrun_mm))
 }

@@ -64,6 +64,8 @@ pub struct Site<'a> {
     /// Where the tile's lower left corner lies in the part, in mm: passes of all tiles of a part lie on
     /// one lattice, so that seams line up.
     pub origin_mm: [f64; 2],
+    /// Whether what stands past the tile's edges is to be kept (a neighbour on the same sheet).
+    pub neighbours: bool,
     /// Metal around the tile, in mm; past it is air.
     pub margin_mm: f64,
     /// The blank's top above the tile's highest design point, in mm.

@@ -64,6 +64,7 @@ pub fn site<'a>(relief: &'a Relief, unit_mm: f64, path_tolerance_mm: f64) -> Sit
     Site {
         surface: relief,
         origin_mm: [0.0, 0.0],
+        neighbours: false,
         margin_mm: 0.6,
         top_allowance_mm: 0.2,
         z_zero_mm: 0.2,
