@@ -3,5 +3,7 @@ use std::process::ExitCode;
 mod cli;
 
 fn main() -> ExitCode {
+    // A reader that has seen enough (`| head`) ends the program, it does not make it panic.
+    sigpipe::reset();
     cli::run()
 }

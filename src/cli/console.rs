@@ -1,6 +1,7 @@
 //! Progress on the terminal, stage times, and the interrupt key.
 
 use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -10,13 +11,35 @@ use screenmill::progress::Progress;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Ctrl-C and a polite kill end the work at the next safe place; a second one ends it at once.
+/// Folders that hold unfinished outputs.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// How long a stage may take to notice an interrupt before the program ends without it.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Ctrl-C and a polite kill end the work at the next safe place, and after two seconds wherever it is;
+/// unfinished outputs are removed either way.
 pub fn listen_for_interrupt() -> Result<(), ctrlc::Error> {
     ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::SeqCst) {
-            std::process::exit(2);
+        INTERRUPTED.store(true, Ordering::SeqCst);
+        std::thread::sleep(PATIENCE);
+        for folder in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+            // What cannot be removed keeps its hidden name.
+            let _ = std::fs::remove_dir_all(folder);
         }
+        eprintln!("error: {}", screenmill::pipeline::Error::Interrupted);
+        std::process::exit(2);
     })
+}
+
+/// Has a folder removed if the program is interrupted, until [`finished`].
+pub fn unfinished(folder: &Path) {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).push(folder.to_path_buf());
+}
+
+/// Leaves a folder alone again.
+pub fn finished(folder: &Path) {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).retain(|known| known != folder);
 }
 
 struct Stage {

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use screenmill::pipeline::Error;
 use tempfile::TempDir;
 
+use super::console;
+
 /// A hidden folder inside the output folder, removed with all it holds unless it is published.
 pub struct Staging {
     folder: TempDir,
@@ -22,6 +24,7 @@ impl Staging {
         let made = !out.exists();
         fs::create_dir_all(out).map_err(refused)?;
         let folder = tempfile::Builder::new().prefix(".screenmill-").tempdir_in(out).map_err(refused)?;
+        console::unfinished(if made { out } else { folder.path() });
         Ok(Staging { folder, out: out.to_path_buf(), made, published: false })
     }
 
@@ -31,6 +34,7 @@ impl Staging {
 
     /// Puts these under their final names; what an earlier run left there goes first.
     pub fn publish(mut self, outputs: &[&str]) -> Result<(), Error> {
+        console::finished(if self.made { &self.out } else { self.folder.path() });
         for name in outputs {
             let (from, to) = (self.folder.path().join(name), self.out.join(name));
             let failed = |source| Error::OutputFolder { path: to.clone(), source };
