@@ -45,7 +45,7 @@ fn one_wrong_z_word_changes_the_verdict() {
     let lines: Vec<&str> = text.lines().collect();
     // A cut in the middle of the program, well inside the part.
     let is_cut = |line: &&str| line.starts_with('X') && line.contains(" Z-") && !line.starts_with("X-");
-    let at = lines.len() / 2 + lines[lines.len() / 2..].iter().position(|l| is_cut(l)).expect("a cut");
+    let at = lines.len() / 2 + lines[lines.len() / 2..].iter().position(is_cut).expect("a cut");
     let start = lines[at].find(" Z").expect("a word") + 2;
     let end = lines[at][start..].find(' ').map_or(lines[at].len(), |length| start + length);
     let z: f64 = lines[at][start..end].parse().expect("a number");
