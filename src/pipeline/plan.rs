@@ -145,7 +145,7 @@ pub fn programs(
             tile: tile.setup.tile.name.clone(),
             source,
         };
-        progress.begin(operation.kind.word(), 1000);
+        progress.begin(&format!("{} {}", operation.kind.word(), tool.name), 1000);
         let told = std::cell::Cell::new(0u64);
         let tell = |part: f64| {
             let now = (part * 1000.0) as u64;
