@@ -88,9 +88,7 @@ pub fn check(
 ) -> Result<Checked, Error> {
     let shop = Shop::open(job, folder)?;
     let part = Part::load(job, progress)?;
-    if let (Some(limit), None) = (job.limits.on_audience_min, &part.scene) {
-        return Err(Error::NoLight { limit, what: "not designed from a scene" });
-    }
+    part.check_light(job)?;
     let tiles = setups(job, &shop, &part)?;
     let candidates = candidates(job, &shop, &tiles)?;
     let usable: Vec<usize> = (0..candidates.len()).filter(|&i| candidates[i].refused.is_none()).collect();
@@ -256,7 +254,7 @@ impl Facts<'_> {
     }
 
     fn sight(&self, tile: &TileSetup) -> Option<Sight<'_>> {
-        let steepest = tile.surface().steepest();
+        let steepest = self.part.whole.steepest();
         let pose = self.part.pose(self.job, &tile.piece)?;
         let scene = self.part.scene.as_ref()?;
         Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]) })

@@ -49,9 +49,7 @@ pub struct TileResult {
 pub fn mill(job: &Job, folder: &Path, staging: &Path, progress: &dyn Progress) -> Result<Milled, Error> {
     let shop = Shop::open(job, folder)?;
     let part = Part::load(job, progress)?;
-    if let (Some(limit), None) = (job.limits.on_audience_min, &part.scene) {
-        return Err(Error::NoLight { limit, what: "not designed from a scene" });
-    }
+    part.check_light(job)?;
     let tiles = setups(job, &shop, &part)?;
     let mut results = Vec::new();
     for tile in tiles {
@@ -147,7 +145,7 @@ fn judged(
         .collect();
     let cutters = distinct(reaching(shop).into_iter(), step_mm)?;
     let (names, candidates) = candidates(shop, step_mm)?;
-    let steepest = surface.steepest();
+    let steepest = part.whole.steepest();
     let sight = match (part.pose(job, &tile.piece), &part.scene) {
         (Some(pose), Some(scene)) => Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]) }),
         _ => None,

@@ -14,7 +14,7 @@ const POINTS: usize = 4;
 pub struct Sight<'a> {
     pub scene: &'a Scene,
     pub pose: Pose,
-    /// Steepest face of the tile.
+    /// Steepest face of the part, as it hangs.
     pub steepest: f64,
 }
 

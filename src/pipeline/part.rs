@@ -131,6 +131,19 @@ impl Part {
         })
     }
 
+    /// Refuses a limit on the light of a part that has none.
+    pub fn check_light(&self, job: &Job) -> Result<(), Error> {
+        let what = match (&self.scene, job.part.form) {
+            (None, _) => "not designed from a scene",
+            (_, Form::Die) => "a die, which reflects nothing",
+            _ => return Ok(()),
+        };
+        match job.limits.on_audience_min {
+            Some(limit) => Err(Error::NoLight { limit, what }),
+            None => Ok(()),
+        }
+    }
+
     /// What the part may be cut between.
     pub fn quantum(&self) -> Quantum {
         match &self.design {
