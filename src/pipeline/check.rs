@@ -12,7 +12,7 @@ use super::light::{self, Sight};
 use super::part::Part;
 use super::plan::TileSetup;
 use super::shop::Shop;
-use super::{Error, maps};
+use super::{Error, WITHIN, maps};
 use crate::compensation::{self, Profile};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{self, Layers, Tally};
@@ -21,9 +21,6 @@ use crate::job::Job;
 use crate::machine::Tool;
 use crate::progress::Progress;
 use crate::report::{Finding, Light, Severity, Verdict, finding};
-
-/// Part of the area that has to lie within `limits.deviation_mm`.
-const WITHIN: f64 = 0.99;
 
 /// Sets of cutters whose light and normals are worked out before the job is called infeasible.
 const TRIED_SETS: usize = 4;

@@ -26,3 +26,6 @@ pub use check::{Checked, Reach, check};
 pub use cut::{Milled, mill};
 pub use error::Error;
 pub use estimate::{Estimated, estimate};
+
+/// Part of the area that has to lie within `limits.deviation_mm`.
+const WITHIN: f64 = 0.99;

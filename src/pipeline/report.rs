@@ -6,7 +6,7 @@ use super::cut::{Milled, TileResult};
 use super::part::Part;
 use super::plan::{self, Program};
 use super::shop::Shop;
-use super::{Error, light, pages};
+use super::{Error, WITHIN, light, pages};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
 use crate::job::{Form, Job};
@@ -14,9 +14,6 @@ use crate::report::cavity_list::{self, TileCavities};
 use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
 use crate::tolerance::Budget;
 use crate::verify::ProgramCut;
-
-/// Part of the area that has to lie within `limits.deviation_mm`.
-const WITHIN: f64 = 0.99;
 
 /// Writes everything but the programs and maps, which are there already, and gives the verdict.
 pub fn finish(

@@ -35,7 +35,7 @@ pub struct SheetTile {
     pub blank_mm: [f64; 3],
     /// Metal around the tile.
     pub margin_mm: f64,
-    /// Lower left corner of the tile above the blank's lower left corner; usually the margin twice.
+    /// Lower left corner of the tile above the blank's lower left corner.
     pub origin_on_blank_mm: [f64; 2],
     pub fixture: String,
     pub fixture_notes: Vec<String>,
