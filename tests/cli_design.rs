@@ -1,4 +1,4 @@
-//! `screenmill design` as sentences.
+//! `screenmill design` and `limits` as sentences.
 
 use std::fs;
 use std::path::Path;
@@ -9,6 +9,19 @@ use screenmill::screen::Design;
 
 fn sample(name: &str) -> String {
     format!("{}/samples/{name}.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn screenmill(arguments: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("screenmill").expect("the program").args(arguments).assert()
+}
+
+/// The theatre with coarse cells, and perhaps another change.
+fn coarse(folder: &Path, from: &str, to: &str) -> String {
+    let text = fs::read_to_string(sample("theatre")).expect("a sample");
+    assert!(text.contains(from));
+    let path = folder.join("screen.toml");
+    fs::write(&path, text.replace("width_mm = 4.0", "width_mm = 50.0").replace(from, to)).expect("written");
+    path.to_str().expect("text").into()
 }
 
 fn design(arguments: &[&str]) -> assert_cmd::assert::Assert {
@@ -106,4 +119,39 @@ fn a_refusal_is_one_message_and_leaves_nothing_behind() {
     design(&[stitched.to_str().expect("text"), "--out", out, "--stl", out, "--cells", "0", "0", "1", "1"])
         .code(2)
         .stderr(predicate::str::contains("a stitched design is not written as .stl"));
+}
+
+#[test]
+fn a_screen_within_its_limits_says_what_would_break_first() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = coarse(folder.path(), "schema", "schema");
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("text");
+    let said = screenmill(&["limits", &scene, "--out", out, "--json"]).success();
+    let json: serde_json::Value = serde_json::from_slice(&said.get_output().stdout).expect("one JSON object");
+    assert_eq!(json["verdict"], "pass");
+    let sentence = json["sentence"].as_str().expect("text");
+    assert!(
+        sentence.contains("of audience \"stalls\"") && sentence.contains("degrees of margin"),
+        "{sentence}"
+    );
+    for file in json["files"].as_array().expect("files") {
+        let path = Path::new(out).join(file.as_str().expect("text"));
+        assert!(fs::metadata(&path).expect("written").len() > 1000, "{}", path.display());
+    }
+    let first = fs::read(Path::new(out).join("design-space.png")).expect("a picture");
+    let svg = fs::read_to_string(Path::new(out).join("design-space.svg")).expect("a picture");
+    assert!(svg.contains("Design space: screen") && svg.contains("Eq. 11"));
+    screenmill(&["limits", &scene, "--out", out, "--threads", "1"])
+        .success()
+        .stdout(predicate::str::contains("no point of the"));
+    assert!(first == fs::read(Path::new(out).join("design-space.png")).expect("a picture"));
+}
+
+#[test]
+fn a_screen_that_shadows_itself_ends_with_1_and_says_where() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = coarse(folder.path(), "[-1.0, -0.65, 2.0]", "[-9.0, -0.65, 2.0]");
+    screenmill(&["limits", &scene]).code(1).stdout(predicate::str::contains("degrees beyond the limit"));
+    screenmill(&["limits", &sample("missing")]).code(2).stderr(predicate::str::contains("missing.toml"));
 }

@@ -1,6 +1,6 @@
-//! Cells turned, scaled and shuffled.
+//! Cells turned, scaled and shuffled; scenes mirrored.
 
-use screenmill::screen::{Workspace, solve};
+use screenmill::screen::{self, Scene, Workspace, solve};
 
 fn facets(count: usize) -> (Vec<[f64; 2]>, Vec<f64>) {
     let spread = |k: usize, step: f64| (k as f64 * step).fract() - 0.5;
@@ -72,4 +72,49 @@ fn hard_facets_are_solved_too() {
             assert!((a / p - 1.0).abs() <= 1e-6);
         }
     }
+}
+
+/// A screen of a few cells before a box that stands to one side, mirrored or not.
+fn beside(mirror: f64) -> Scene {
+    let mut corners = Vec::new();
+    for x in [0.2, 1.7] {
+        for y in [-0.4, 0.5] {
+            for z in [1.1, 2.3] {
+                corners.push(format!("[{}, {y}, {z}]", mirror * x));
+            }
+        }
+    }
+    let text = include_str!("../samples/theatre.toml")
+        .replace("width_m = 2.0", "width_m = 0.6")
+        .replace("height_m = 1.0", "height_m = 0.4")
+        .replace("width_mm = 4.0", "width_mm = 20.0")
+        .replace("[0.0, 0.0, 3.0]", &format!("[{}, 0.1, 2.5]", 0.3 * mirror));
+    let start = text.find("vertices_m").expect("corners");
+    let end = text.find("[microgeometry]").expect("a microgeometry");
+    let text = format!("{}vertices_m = [{}]\n\n{}", &text[..start], corners.join(", "), &text[end..]);
+    Scene::parse(&text, "beside.toml").expect("a scene")
+}
+
+#[test]
+fn a_mirrored_scene_has_mirrored_limits() {
+    let (one, other) = (beside(1.0), beside(-1.0));
+    let of = |scene: &Scene| {
+        let elevation = screen::elevation(scene).expect("an elevation");
+        screen::limits(scene, Some(&elevation)).expect("limits")
+    };
+    let (a, b) = (of(&one), of(&other));
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-6, "{a} {b}");
+    assert_eq!(a.points, 30 * 20);
+    near(a.any_direction.eq10_margin_deg, b.any_direction.eq10_margin_deg);
+    near(a.horizontal.eq11_margin_deg, b.horizontal.eq11_margin_deg);
+    near(a.facet_pair_deg, b.facet_pair_deg);
+    for (at, opening) in a.field.horizontal.iter().enumerate() {
+        let mirrored = &b.field.horizontal[at / 30 * 30 + 29 - at % 30];
+        near(opening.alpha_deg, mirrored.beta_deg);
+        near(opening.beta_deg, mirrored.alpha_deg);
+        near(opening.gamma_deg, 180.0 - mirrored.gamma_deg);
+    }
+    let (worst, mirrored) = (&a.any_direction.worst, &b.any_direction.worst);
+    near(worst.point_m[0], -mirrored.point_m[0]);
+    near(worst.corner_m[0], -mirrored.corner_m[0]);
 }

@@ -7,6 +7,7 @@ mod console;
 mod design;
 mod estimate;
 mod fixtures;
+mod limits;
 mod machines;
 mod mill;
 mod part;
@@ -55,6 +56,7 @@ enum Command {
     Check(check::Arguments),
     Estimate(estimate::Arguments),
     Design(design::Arguments),
+    Limits(limits::Arguments),
     Raster(raster::Arguments),
     Compensate(compensate::Arguments),
     Simulate(simulate::Arguments),
@@ -96,6 +98,7 @@ pub fn run() -> ExitCode {
         Command::Check(arguments) => check::run(arguments, common),
         Command::Estimate(arguments) => estimate::run(arguments, common),
         Command::Design(arguments) => design::run(arguments, common),
+        Command::Limits(arguments) => limits::run(arguments, common),
         Command::Raster(arguments) => raster::run(arguments, common),
         Command::Compensate(arguments) => compensate::run(arguments, common),
         Command::Simulate(arguments) => simulate::run(arguments, common),

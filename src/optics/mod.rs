@@ -1,8 +1,10 @@
-//! Half vector, Fresnel reflectance: pure light, no machining.
+//! Half vector, Fresnel reflectance, solid angles and gain: pure light, no machining.
 
 mod fresnel;
+mod solid_angle;
 
 pub use fresnel::ComplexIndex;
+pub use solid_angle::{even_gain, projected_solid_angle};
 
 use glam::DVec3;
 

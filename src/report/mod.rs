@@ -1,6 +1,8 @@
 //! Everything shown, nothing computed: JSON, maps and their pictures, lists of cavities, pages.
 
 pub mod cavity_list;
+pub mod design_space;
+pub mod figure;
 pub mod files;
 mod format;
 pub mod maps;
@@ -28,6 +30,8 @@ pub enum Error {
          hint: every layer must be of the same tile"
     )]
     Strip { samples: usize, columns: usize, rows_left: usize },
+    #[error("{path} could not be drawn: {source}; hint: this is a fault of the program, please report it")]
+    Figure { path: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error(
         "{page} could not be filled in: {source}; hint: this is a fault of the program, please report it"
     )]

@@ -32,9 +32,25 @@ pub(super) fn sees(audience: &[Polyhedron], point_m: DVec3) -> bool {
 /// both cover counts once. A part under the horizon is cut off at a height of 0.001 of its
 /// distance.
 pub(super) fn integrate(audience: &[Polyhedron], point_m: DVec3, mut visit: impl FnMut(DVec3, f64)) {
+    for piece in pieces(audience, point_m, LOWEST_Z) {
+        for k in 2..piece.len() {
+            let corner = |at: usize| {
+                let [x, y] = piece[at].0;
+                DVec3::new(x, y, 1.0).normalize()
+            };
+            triangle(corner(0), corner(k - 1), corner(k), &mut visit);
+        }
+    }
+}
+
+/// The view of the audience as convex polygons on the plane z = 1 before the point, counter-clockwise
+/// and without overlap: what two polyhedra cover is in one polygon only. A part under the horizon is
+/// cut off at a height of `lowest` of its distance.
+pub(super) fn pieces(audience: &[Polyhedron], point_m: DVec3, lowest: f64) -> Vec<Vec<Vertex>> {
     let mut earlier: Vec<Vec<Vertex>> = Vec::with_capacity(audience.len());
+    let mut all = Vec::new();
     for polyhedron in audience {
-        let outline = outline(polyhedron, point_m);
+        let outline = outline(polyhedron, point_m, lowest);
         if outline.len() < 3 {
             continue;
         }
@@ -42,24 +58,17 @@ pub(super) fn integrate(audience: &[Polyhedron], point_m: DVec3, mut visit: impl
         for other in &earlier {
             pieces = pieces.into_iter().flat_map(|piece| without(piece, other)).collect();
         }
-        for piece in &pieces {
-            for k in 2..piece.len() {
-                let corner = |at: usize| {
-                    let [x, y] = piece[at].0;
-                    DVec3::new(x, y, 1.0).normalize()
-                };
-                triangle(corner(0), corner(k - 1), corner(k), &mut visit);
-            }
-        }
+        all.append(&mut pieces);
         earlier.push(outline);
     }
+    all
 }
 
 /// The outline of a polyhedron on the plane z = 1 before the point, counter-clockwise.
-fn outline(polyhedron: &Polyhedron, point_m: DVec3) -> Vec<Vertex> {
+pub(super) fn outline(polyhedron: &Polyhedron, point_m: DVec3, lowest: f64) -> Vec<Vertex> {
     let corners: Vec<DVec3> = polyhedron.vertices_m().iter().map(|&v| v - point_m).collect();
     let reach = corners.iter().map(|v| v.length()).fold(0.0, f64::max);
-    let floor = LOWEST_Z * reach;
+    let floor = lowest * reach;
     let mut above: Vec<DVec3> = corners.iter().copied().filter(|v| v.z > floor).collect();
     if above.len() < corners.len() {
         for a in corners.iter().filter(|v| v.z > floor) {

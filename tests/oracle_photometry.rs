@@ -1,0 +1,122 @@
+//! Limits and light of a screen against closed forms, hand-worked cases and naive twins.
+
+use glam::DVec3;
+use screenmill::optics::half_vector;
+use screenmill::screen::{self, Scene};
+
+fn sample(name: &str) -> Scene {
+    let path = format!("{}/samples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    Scene::read(path.as_ref()).expect("a sample scene")
+}
+
+/// A screen of one cell at the origin with the projector straight before it, and boxes for audience.
+fn one_cell(boxes: &[[[f64; 2]; 3]]) -> Scene {
+    let text = include_str!("../samples/theatre.toml")
+        .replace("width_m = 2.0", "width_m = 0.004")
+        .replace("height_m = 1.0", "height_m = 0.004")
+        .replace("\"poisson\"", "\"flat\"");
+    let start = text.find("[[audience]]").expect("an audience");
+    let end = text.find("[microgeometry]").expect("a microgeometry");
+    let mut audience = String::new();
+    for [x, y, z] in boxes {
+        let mut corners = Vec::new();
+        for x in x {
+            for y in y {
+                corners.extend(z.iter().map(|z| format!("[{x}, {y}, {z}]")));
+            }
+        }
+        audience += &format!("[[audience]]\nvertices_m = [{}]\n", corners.join(", "));
+    }
+    Scene::parse(&format!("{}{audience}\n{}", &text[..start], &text[end..]), "one.toml").expect("a scene")
+}
+
+fn near(a: f64, b: f64, tolerance: f64) {
+    assert!((a - b).abs() < tolerance, "{a} {b}");
+}
+
+#[test]
+fn eqs_10_and_11_are_those_worked_by_hand_before_the_centre() {
+    // A front face of 2 x 1 at distance 2: alpha = beta = atan 2 along x, atan 4 along y; gamma = 90.
+    let margins = screen::limits(&one_cell(&[[[-1.0, 1.0], [-0.5, 0.5], [2.0, 3.0]]]), None).expect("limits");
+    let (wide, high) = (2.0_f64.atan().to_degrees(), 4.0_f64.atan().to_degrees());
+    near(margins.horizontal.alpha_deg[0], wide, 1e-9);
+    near(margins.horizontal.eq10_margin_deg, 3.0 * wide - 90.0, 1e-9);
+    near(margins.horizontal.eq11_margin_deg, 2.0 * wide - 60.0, 1e-9);
+    near(margins.vertical.eq10_margin_deg, 3.0 * high - 90.0, 1e-9);
+    // The widest plane runs through a corner, sqrt(1.25) from the axis.
+    let corner = (2.0 / 1.25_f64.sqrt()).atan().to_degrees();
+    near(margins.any_direction.eq10_margin_deg, 3.0 * corner - 90.0, 1e-9);
+    near(margins.any_direction.worst.azimuth_deg, 0.5_f64.atan().to_degrees(), 1e-3);
+    assert_eq!(margins.points_broken, 0);
+}
+
+#[test]
+fn an_audience_of_more_than_120_degrees_breaks_both_equations() {
+    // Edges 29 degrees over the horizon: 180 - 29 - 58 = 93 > 90.
+    let half = 2.0 / 29.0_f64.to_radians().tan();
+    let margins =
+        screen::limits(&one_cell(&[[[-half, half], [-0.1, 0.1], [2.0, 3.0]]]), None).expect("limits");
+    near(margins.horizontal.eq10_margin_deg, -3.0, 1e-9);
+    near(margins.horizontal.eq11_margin_deg, -2.0, 1e-9);
+    assert_eq!(margins.points_broken, 1);
+    // In the plane of both edges the ray of one meets the facet of the other: -3 / 2 degrees, by symmetry.
+    assert!(margins.facet_pair_deg < 0.0);
+}
+
+#[test]
+fn no_pair_of_sampled_facets_comes_nearer_than_the_limit_says() {
+    let mut scene = sample("home-theatre");
+    scene.microgeometry.width_mm = 200.0;
+    let margins = screen::limits(&scene, None).expect("limits");
+    assert_eq!(margins.points, 50);
+    let mut sampled = 1.0_f64;
+    for at in 0..50 {
+        let x = scene.centre_m(f64::from(at % 10), f64::from(at / 10), 0.0);
+        let i = (scene.projector_m - x).normalize();
+        let list = screen::directions(&scene.view(x), 400).expect("an audience").list;
+        for o in &list {
+            for h in list.iter().map(|&other| half_vector(i, other)) {
+                sampled = sampled.min(o.dot(h));
+            }
+        }
+    }
+    let sampled = sampled.asin().to_degrees();
+    assert!(margins.facet_pair_deg <= sampled, "{} {sampled}", margins.facet_pair_deg);
+    assert!(margins.facet_pair_deg > sampled - 2.0, "{} {sampled}", margins.facet_pair_deg);
+}
+
+#[test]
+fn the_samples_keep_the_margins_that_an_independent_implementation_found() {
+    // Degrees: Eq. 10 along rows, with extreme light, Eq. 11 along rows, worst plane, facet pair.
+    for (name, expected) in [
+        ("theatre", [100.0, 68.8, 66.9, 94.9, 47.4]),
+        ("conference", [67.7, 42.8, 45.2, 64.0, 32.0]),
+        ("home-theatre", [79.9, 53.9, 53.3, 77.2, 38.6]),
+    ] {
+        let mut scene = sample(name);
+        scene.microgeometry.width_mm = 20.0;
+        let margins = screen::limits(&scene, None).expect("limits");
+        let found = [
+            margins.horizontal.eq10_margin_deg,
+            margins.horizontal.eq10_extreme_margin_deg,
+            margins.horizontal.eq11_margin_deg,
+            margins.any_direction.eq10_margin_deg,
+            margins.facet_pair_deg,
+        ];
+        for (found, expected) in found.iter().zip(expected) {
+            // Cells of 20 mm end 8 mm further in than those of the table.
+            assert!((found - expected).abs() < 0.7, "{name}: {found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_cell_of_4_mm_is_0_6_arcmin_from_23_m() {
+    let scene = one_cell(&[[[-1.0, 1.0], [-1.0, 1.0], [22.0, 24.0]]]);
+    let acuity = screen::acuity(&scene);
+    near(acuity.middle_m, 23.0, 1e-9);
+    near(acuity.middle_arcmin, 0.598, 1e-3);
+    near(acuity.nearest_m, 22.0, 1e-9);
+    near(acuity.one_arcmin_m, 13.751, 1e-3);
+    assert!(acuity.farthest_m > DVec3::new(1.0, 1.0, 23.9).length());
+}
