@@ -1,5 +1,10 @@
 //! Times worked by hand from the controllers' published equations.
 
+#[path = "linuxcnc-sim/programs.rs"]
+mod linuxcnc_programs;
+
+use std::collections::HashMap;
+
 use screenmill::verify::{Corner, Kinematics, Options, Reading, Timing, time};
 
 fn grbl(acceleration: f64) -> Kinematics {
@@ -7,6 +12,8 @@ fn grbl(acceleration: f64) -> Kinematics {
         feed_max_mm_min: [6000.0; 3],
         rapid_mm_min: [6000.0; 3],
         acceleration_mm_s2: [acceleration; 3],
+        path_max_mm_min: f64::INFINITY,
+        arc_mm: 0.002,
         corner: Corner::JunctionDeviation { mm: 0.01 },
         look_ahead_blocks: 16,
         block_s: 0.0,
@@ -150,27 +157,131 @@ fn the_parts_add_up() {
     close(timing.cutting_s + timing.rapid_s + timing.dwell_s, timing.total_s);
 }
 
-#[test]
-fn linuxcnc_blends_as_grbl_with_0_866_a() {
-    let machine = Kinematics { corner: Corner::Blend { mm: 0.01 }, servo_period_s: 0.001, ..grbl(500.0) };
-    let (sin, cos) = (15.0f64.to_radians()).sin_cos();
-    let body = format!("F6000\nG1 X{:.9} Y{:.9}\nG1 X{:.9} Y0", 100.0 * cos, 100.0 * sin, 200.0 * cos);
-    let v_j = (0.866 * 500.0 * 0.01 * cos / (1.0 - cos)).sqrt();
-    let wanted = with_corner(100.0, v_j, 500.0 / cos, 100.0);
-    let got = run(&body, &machine).total_s;
-    assert!((got - wanted).abs() < 1e-6 * wanted, "{got} {wanted}");
-    let wide = run(&format!("G64 P0.1\n{body}"), &machine).total_s;
-    let exact = run(&format!("G61\n{body}"), &machine).total_s;
-    assert!(wide < got && got < exact, "{wide} {got} {exact}");
+/// The machine of tests/linuxcnc-sim/machine.ini.
+fn linuxcnc() -> Kinematics {
+    Kinematics {
+        feed_max_mm_min: [4800.0, 4800.0, 3000.0],
+        rapid_mm_min: [4800.0, 4800.0, 3000.0],
+        acceleration_mm_s2: [500.0, 500.0, 300.0],
+        path_max_mm_min: 4800.0,
+        corner: Corner::Blend { mm: 0.0 },
+        look_ahead_blocks: 50,
+        servo_period_s: 0.001,
+        ..grbl(500.0)
+    }
 }
 
 #[test]
-fn a_circle_is_held_by_its_radius() {
-    let machine = grbl(100.0);
-    let timing = run("G0 X1\nG3 X1 Y0 I-1 F6000", &machine);
-    let v = (0.866f64 * 100.0).sqrt();
-    let ideal = std::f64::consts::TAU / v;
-    // Half of the acceleration is left to speed up from the speed of the corner, and to brake.
-    let most = ideal + v / 50.0;
-    assert!(timing.cutting_s > most - 2.0 / 50.0 && timing.cutting_s < most, "{} {ideal}", timing.cutting_s);
+fn linuxcnc_rounds_a_corner_by_its_law() {
+    // R = P s / (1 - s), v^2 = 0.866 a R, s = cos(turn / 2): Grbl's law with P for $11.
+    let (turn, p, a) = (30.0f64.to_radians(), 0.01, 500.0);
+    let s = (0.5 * turn).cos();
+    let r = p * s / (1.0 - s);
+    let v = (0.75f64.sqrt() * a * r).sqrt();
+    // From rest to 50 mm/s, down to v, through the arc, up again, and at last to rest: with nothing to
+    // blend into, the last line has half of its acceleration.
+    let (sin, cos) = (0.5 * turn).sin_cos();
+    let leg = 40.0 - r * sin / cos;
+    let ramp = |from: f64, to: f64, a: f64, length: f64| {
+        let ways = ((2500.0 - from * from) + (2500.0 - to * to)) / (2.0 * a);
+        (50.0 - from) / a + (50.0 - to) / a + (length - ways) / 50.0
+    };
+    let wanted = ramp(0.0, v, a / cos, leg) + r * turn / v + ramp(v, 0.0, 0.5 * a / cos, leg);
+    let (x, y) = (40.0 * cos, 40.0 * sin);
+    let body = format!("G64 P{p}\nG1 X{x:.9} Y{y:.9} F3000\nG1 X{:.9} Y0", 2.0 * x);
+    let got = run(&body, &linuxcnc()).total_s;
+    assert!((got - wanted).abs() < 0.004, "{got} {wanted}");
+    // Every block of G61.1 stops, with all of its acceleration.
+    let stops = run(&body.replace("G64 P0.01", "G61.1"), &linuxcnc()).total_s;
+    let twice = 2.0 * ramp(0.0, 0.0, a / cos, 40.0);
+    assert!((stops - twice).abs() < 0.004, "{stops} {twice}");
+}
+
+#[test]
+fn linuxcnc_holds_a_circle_by_its_radius() {
+    // v^2 = 0.866 a r leaves half of the acceleration along the path, of which the last half of that.
+    let timing = run("G64 P0.001\nG0 X2\nG3 X2 Y0 I-2 F4800", &linuxcnc());
+    let v = (0.75f64.sqrt() * 500.0 * 2.0).sqrt();
+    let (up, down) = (v / (0.5 * 250.0), v / (0.5 * 250.0));
+    let wanted = up + down + (std::f64::consts::TAU * 2.0 - 0.5 * v * (up + down)) / v;
+    let got = timing.cutting_s;
+    assert!((got - wanted).abs() < 0.01 * wanted, "{got} {wanted}");
+}
+
+#[test]
+fn linuxcnc_merges_blocks_in_line() {
+    let mut blocks = String::from("F1200");
+    for i in 1..=100 {
+        blocks += &format!("\nG1 X{:.2} Y{:.4}", f64::from(i) * 0.05, 0.0018 * f64::from(i % 2));
+    }
+    let whole = run("G64 P0.002\nG1 X5 F1200", &linuxcnc()).total_s;
+    let merged = run(&format!("G64 P0.002 Q0.002\n{blocks}"), &linuxcnc()).total_s;
+    let apart = run(&format!("G64 P0.002 Q0\n{blocks}"), &linuxcnc()).total_s;
+    close(merged, whole);
+    assert!(apart > 1.08 * merged, "{merged} {apart}");
+    // Without Q, P is the tolerance of both.
+    let without = run(&format!("G64 P0.002\n{blocks}"), &linuxcnc()).total_s;
+    close(without, run(&format!("G64 P0.002 Q0.002\n{blocks}"), &linuxcnc()).total_s);
+}
+
+#[test]
+fn grbl_cuts_an_arc_into_chords() {
+    // n = floor(angle r / (2 sqrt(t (2 r - t)))): 7 chords of a circle of 5 mm, every corner by the law.
+    let (r, t, a, feed) = (5.0f64, 0.5f64, 100.0f64, 6.0f64);
+    let n = (0.5 * std::f64::consts::TAU * r / (t * (2.0 * r - t)).sqrt()).floor();
+    assert_eq!(n, 7.0);
+    let turn = std::f64::consts::TAU / n;
+    let (s, length) = ((0.5 * turn).cos(), 2.0 * r * (0.5 * turn).sin());
+    // An axis that makes a share of the way has so much more along it.
+    let along = |angle: f64| a / angle.cos().abs().max(angle.sin().abs());
+    let corner = |i: f64| {
+        let v = (along(turn * i) * 0.01 * s / (1.0 - s)).sqrt();
+        if i == 0.0 || i == n { 0.0 } else { v }
+    };
+    let mut wanted = 0.0;
+    for i in 0..7 {
+        let i = f64::from(i);
+        let chord = along(turn * (i + 0.5) + 0.5 * std::f64::consts::PI);
+        let (from, to) = (corner(i), corner(i + 1.0));
+        let ways = ((feed * feed - from * from) + (feed * feed - to * to)) / (2.0 * chord);
+        wanted += (2.0 * feed - from - to) / chord + (length - ways) / feed;
+    }
+    let machine = Kinematics { arc_mm: t, ..grbl(a) };
+    close(run("G0 X5\nG4 P0\nG3 X5 Y0 I-5 F360", &machine).cutting_s, wanted);
+}
+
+/// Times that LinuxCNC's own controller took for the programs of tests/linuxcnc-sim/programs.rs, in
+/// seconds by the wall and in motion. `measured.csv` is written by tests/linuxcnc-sim/measure.
+#[test]
+fn linuxcnc_takes_as_long_as_its_controller_does() {
+    let mut measured: HashMap<&str, [f64; 2]> = HashMap::new();
+    for line in include_str!("linuxcnc-sim/measured.csv").lines().skip(1) {
+        let mut fields = line.split(',');
+        let name = fields.next().expect("a name");
+        let seconds: Vec<f64> = fields.map(|s| s.parse().expect("seconds")).collect();
+        measured.insert(name, [seconds[0], seconds[1]]);
+    }
+    let programs = linuxcnc_programs::programs();
+    assert_eq!(programs.len(), measured.len());
+    for program in programs {
+        let reading = Reading::of(program.text.as_bytes(), &Options::default()).expect("a sound program");
+        let timing = time(&reading, &linuxcnc());
+        let [wall_s, moving_s] = measured[program.name().as_str()];
+        let off = timing.total_s / wall_s - 1.0;
+        let moving_off = (timing.total_s - timing.dwell_s) / moving_s - 1.0;
+        println!("{:<40} {wall_s:8.2} {:8.2} {:+.2} %", program.name(), timing.total_s, 100.0 * off);
+        assert!(off.abs() < 0.01, "{}: {} s, the controller took {wall_s} s", program.name(), timing.total_s);
+        assert!(moving_off.abs() < 0.0005, "{}: motion {moving_off}", program.name());
+    }
+}
+
+/// Writes the programs for tests/linuxcnc-sim/measure into the folder $PROGRAMS.
+#[test]
+#[ignore = "writes files; tests/linuxcnc-sim/measure needs them"]
+fn write_the_programs_to_measure() {
+    let folder = std::env::var_os("PROGRAMS").expect("PROGRAMS names a folder");
+    for program in linuxcnc_programs::programs() {
+        let file = std::path::Path::new(&folder).join(format!("{}.ngc", program.name()));
+        std::fs::write(file, &program.text).expect("the folder can be written");
+    }
 }

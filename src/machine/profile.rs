@@ -85,6 +85,12 @@ pub struct Motion {
     pub look_ahead_blocks: u32,
     /// Time that a block takes at least, in seconds.
     pub block_s: f64,
+    /// How far a chord of an arc may stand off it, for controllers that cut arcs into chords.
+    #[serde(default)]
+    pub arc_mm: Option<f64>,
+    /// Largest speed along the path in any direction; without it only the axes limit it.
+    #[serde(default)]
+    pub path_max_mm_min: Option<f64>,
     /// A block is spread over one period of the servo loop at least.
     #[serde(default)]
     pub servo_period_s: Option<f64>,
@@ -169,6 +175,8 @@ impl Machine {
         source.within("motion.corner_mm", motion.corner_mm, 0.0, 10.0)?;
         source.within("motion.look_ahead_blocks", motion.look_ahead_blocks.into(), 1.0, 1e6)?;
         source.within("motion.block_s", motion.block_s, 0.0, 10.0)?;
+        source.within("motion.arc_mm", motion.arc_mm.unwrap_or(0.002), 1e-6, 1.0)?;
+        source.within("motion.path_max_mm_min", motion.path_max_mm_min.unwrap_or(low), low, 1e6)?;
         source.within("motion.servo_period_s", motion.servo_period_s.unwrap_or(0.0), 0.0, 1.0)?;
         source.within("spindle.rpm_min", spindle.rpm_min, 1.0, 1e6)?;
         source.within("spindle.rpm_max", spindle.rpm_max, spindle.rpm_min, 1e6)?;

@@ -5,7 +5,6 @@ mod contact;
 mod error;
 mod gcode;
 mod judged;
-mod kinematics;
 mod reading;
 mod rml;
 mod sweep;

@@ -1,0 +1,97 @@
+use std::collections::VecDeque;
+
+use super::blend::{Joint, join};
+use super::segment::{End, Segment};
+use super::{Controller, Limits};
+
+/// A block is spread over this many servo cycles at least (TP_MIN_SEGMENT_CYCLES).
+const SHORTEST_CYCLES: f64 = 1.02;
+/// The backward pass ends after more peaks than this (TP_OPTIMIZATION_CUTOFF).
+const PEAKS: u32 = 4;
+
+impl Controller {
+    /// Takes a segment in, and runs the servo cycles that pass meanwhile: the controller takes one
+    /// command a cycle. Once the queue is longer than the backward pass, when more come changes
+    /// nothing any more.
+    pub(super) fn push(&mut self, mut next: Segment) {
+        if let Some(before) = self.queue.back_mut() {
+            if before.rapid != next.rapid {
+                before.end_with(End::Stop, &mut next);
+            }
+            match join(&self.limits, before, &mut next) {
+                Joint::Plain => before.settle(self.limits.period),
+                Joint::Arc { blend, keeps } => {
+                    if keeps {
+                        before.settle(self.limits.period);
+                    } else {
+                        self.queue.pop_back();
+                    }
+                    self.queue.push_back(*blend);
+                }
+            }
+        }
+        self.queue.push_back(next);
+        brake_backward(&mut self.queue, &self.limits);
+        self.cycle(1);
+        while self.queue.len() > self.limits.depth + 4 {
+            self.cycle(u64::MAX);
+        }
+    }
+
+    /// Runs until the queue is empty.
+    pub(super) fn drain(&mut self) {
+        while !self.queue.is_empty() {
+            self.cycle(u64::MAX);
+        }
+    }
+}
+
+/// Finds how fast each of the last segments may end, from the back (tp.c: tpRunOptimization).
+fn brake_backward(queue: &mut VecDeque<Segment>, limits: &Limits) {
+    let segments = queue.make_contiguous();
+    let (mut peaks, mut stops) = (0, 0);
+    for index in (1..segments.len()).rev().take(limits.depth + 1) {
+        let (before, rest) = segments.split_at_mut(index);
+        let (Some(before), Some(this)) = (before.last_mut(), rest.first_mut()) else { return };
+        if before.end != End::Tangent {
+            stops += 1;
+            if stops > 1 {
+                return;
+            }
+            continue;
+        }
+        // What has run a quarter of its way can't be braked safely.
+        if before.progress >= 0.25 * before.length || before.ending.is_some() || before.handing_over {
+            return;
+        }
+        if this.settled {
+            let mut limit = this.speed_max.min(before.speed_max);
+            if let Some(kink) = before.kink_speed {
+                limit = limit.min(kink);
+            }
+            let from2 = this.end_speed * this.end_speed + 2.0 * this.acceleration_along() * this.length;
+            if from2 >= limit * limit {
+                before.end_speed = limit;
+                before.at_peak = true;
+            } else {
+                before.end_speed = from2.sqrt();
+            }
+            this.speed_max = this.speed_max.min(this.length / (SHORTEST_CYCLES * limits.period));
+        } else {
+            // Half of it may still go to a blend: stop by the half.
+            let triangle = (this.acceleration_along() * this.length).sqrt();
+            let mut speed = before.speed_max.min(triangle).min(this.speed_asked()).min(limits.path_speed);
+            if let Some(kink) = before.kink_speed {
+                speed = speed.min(kink);
+            }
+            before.end_speed = speed;
+            this.end_speed = 0.0;
+        }
+        if this.at_peak {
+            peaks += 1;
+        }
+        if peaks > PEAKS {
+            return;
+        }
+    }
+}

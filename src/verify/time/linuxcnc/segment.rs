@@ -1,0 +1,143 @@
+use glam::DVec3;
+
+/// What the tangential part of the acceleration keeps beside a blend's normal part.
+pub(super) const TANGENTIAL: f64 = 0.5;
+
+/// sqrt(1 - [`TANGENTIAL`]^2).
+pub(super) const NORMAL: f64 = 0.866_025_403_784_438_6;
+
+/// How a segment hands over to the next (tc_types.h: TC_TERM_COND_*).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// At rest, whatever follows.
+    Stop,
+    /// At rest, unless the next begins in the same direction.
+    Exact,
+    /// The next begins while this one still brakes, each with half of its acceleration.
+    Parabola,
+    /// Without a stop.
+    Tangent,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Shape {
+    Line,
+    /// An arc of the program.
+    Arc(Circle),
+    /// An arc that rounds a corner.
+    Blend,
+}
+
+/// What a blend needs to know of an arc. Unit vectors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Circle {
+    pub radius: f64,
+    pub angle: f64,
+    pub normal: DVec3,
+    /// Towards the centre, from the first point and from the last.
+    pub inward: [DVec3; 2],
+    /// How far a helix climbs.
+    pub climb: f64,
+}
+
+/// One segment of the controller's queue. Lengths in mm, speeds in mm/s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Segment {
+    pub shape: Shape,
+    pub rapid: bool,
+    pub end: End,
+    /// A parabola leads into it.
+    pub parabola_before: bool,
+    pub length: f64,
+    /// Before blends took their parts.
+    pub nominal_length: f64,
+    /// Unit tangents at start and end.
+    pub first: DVec3,
+    pub last: DVec3,
+    pub requested: f64,
+    pub speed_max: f64,
+    pub acceleration: f64,
+    /// Share of the acceleration along the path.
+    pub tangential: f64,
+    /// Speed that the kink at its end allows.
+    pub kink_speed: Option<f64>,
+    /// Share of the acceleration that the kinks at its start and end take.
+    pub kink_before: f64,
+    pub kink_after: f64,
+    /// G64 P; 0 is none.
+    pub tolerance: f64,
+    /// No blend will shorten it any more.
+    pub settled: bool,
+    /// Speed at its end, as far as the queue can be braked from.
+    pub end_speed: f64,
+    pub at_peak: bool,
+
+    // While it runs.
+    pub active: bool,
+    pub progress: f64,
+    pub speed: f64,
+    pub ramp: bool,
+    /// It ends within the next cycle, after this part of it and at this speed.
+    pub ending: Option<Ending>,
+    /// Time of its next step: what a segment before it left of the cycle.
+    pub period: f64,
+    pub done: bool,
+    pub braking: bool,
+    pub handing_over: bool,
+}
+
+/// The last, shorter step of a segment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ending {
+    pub time: f64,
+    pub speed: f64,
+}
+
+impl Segment {
+    pub fn acceleration_whole(&self) -> f64 {
+        let kinks = 1.0 - self.kink_after.max(self.kink_before);
+        let halved = self.parabola_before || self.end == End::Parabola;
+        self.acceleration * if halved { 0.5 * kinks } else { kinks }
+    }
+
+    /// Along the path.
+    pub fn acceleration_along(&self) -> f64 {
+        let whole = self.acceleration_whole();
+        if self.shape == Shape::Line { whole } else { whole * self.tangential }
+    }
+
+    pub fn speed_asked(&self) -> f64 {
+        self.requested.min(self.speed_max)
+    }
+
+    /// Fixes its length: a step of the servo loop at most covers it, and an arc is as fast as its
+    /// radius allows.
+    pub fn settle(&mut self, period: f64) {
+        if self.settled {
+            return;
+        }
+        self.speed_max = self.speed_max.min(self.length / period);
+        if let Shape::Arc(circle) = self.shape {
+            let whole = self.acceleration_whole();
+            let radius = circle.radius + circle.climb * circle.climb / circle.radius;
+            let normal = self.speed_max * self.speed_max / radius;
+            if normal > NORMAL * whole {
+                self.speed_max = (NORMAL * whole * radius).sqrt();
+                self.tangential = TANGENTIAL;
+            } else {
+                self.tangential = (1.0 - (normal / whole).powi(2)).sqrt();
+            }
+        }
+        self.settled = true;
+    }
+
+    /// Sets how this one ends and what that means for the next.
+    pub fn end_with(&mut self, end: End, next: &mut Segment) {
+        self.end = end;
+        next.parabola_before = end == End::Parabola;
+    }
+
+    pub fn left(&self) -> f64 {
+        self.length - self.progress
+    }
+}
