@@ -54,8 +54,14 @@ const DIALECTS: &[(&str, &str)] = &[
     file!("linuxcnc", "posts/linuxcnc.toml"),
     file!("rml1", "posts/rml1.toml"),
 ];
-const FIXTURES: &[(&str, &str)] =
-    &[file!("clamps", "fixtures/clamps.toml"), file!("vacuum-plate", "fixtures/vacuum-plate.toml")];
+const FIXTURES: &[(&str, &str)] = &[
+    file!("clamps", "fixtures/clamps.toml"),
+    file!("corner-clamps", "fixtures/corner-clamps.toml"),
+    file!("dowel-plate", "fixtures/dowel-plate.toml"),
+    file!("tape-board", "fixtures/tape-board.toml"),
+    file!("vacuum-plate", "fixtures/vacuum-plate.toml"),
+    file!("vise", "fixtures/vise.toml"),
+];
 const LIBRARIES: &[(&str, &str)] =
     &[file!("tools", "samples/tools.toml"), file!("tools-srm-20", "samples/tools-srm-20.toml")];
 

@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use screenmill::catalogue::{self, Kind};
 use screenmill::machine::{
-    Blanks, Bounds, Error, Fixture, Library, Machine, Quantum, Setup, Stock, ZNeed, fits_z, floor_mm, split,
-    split_in_z,
+    Blanks, Bounds, Error, Fixture, Guard, Library, Machine, Quantum, Setup, Stock, ZNeed, fits_z, floor_mm,
+    split, split_in_z,
 };
 
 fn stock(blanks: Blanks) -> Stock {
@@ -101,7 +101,7 @@ proptest! {
                 low_mm: [-overrun, -overrun, -1.0],
                 high_mm: [tile.width_mm + overrun, tile.height_mm + overrun, 5.0],
             };
-            prop_assert!(setup.check(&motions, 0.5, 5.0, &machine).is_ok());
+            prop_assert!(setup.check(&motions, 0.0, &machine).is_ok());
             if !one {
                 for (axis, travel) in travel.into_iter().enumerate() {
                     let zero = setup.zero_on_table_mm[axis];
@@ -186,15 +186,55 @@ fn clamps_stand_where_the_blank_s_edges_are() {
         let tiles = split([40.0, 40.0], cell, 1.0, &stock, &machine, &fixture).expect("fits");
         Setup::place(tiles[0].clone(), [40.0, 40.0], &stock, &machine, &fixture)
     };
-    let motions = Bounds { low_mm: [-1.0, -1.0, -3.0], high_mm: [41.0, 41.0, 10.0] };
     // Clamps reach 6 mm over the margin, the cutter 1 + 0.5 mm out: 7.5 mm touch, 8 mm do not.
-    assert!(place(8.0).check(&motions, 0.5, 10.0, &machine).is_ok());
-    let refusal = place(3.0).check(&motions, 0.5, 10.0, &machine).expect_err("in the clamp");
+    assert!(place(8.0).check_reach(1.5, 1.5, 3.0, 8.0).is_ok());
+    let refusal = place(3.0).check_reach(1.5, 1.5, 3.0, 3.0).expect_err("in the clamp");
     assert_eq!(
         refusal.to_string(),
-        "the cutter would run up to 4.500 mm into \"left\" (8 mm above the stock) on tile r0c0; hint: a larger margin_mm or another fixture"
+        "\"left\" stands in the way on tile r0c0: 3.000 mm inside it, and the cutters go 1.500 mm past its edges; hint: margin_mm = 7.5 (it is 3), or another fixture"
     );
+    assert!(place(7.5).check_reach(1.5, 1.5, 3.0, 7.5).is_ok(), "the hint does what it says");
+    // A plane over the clamps, and the job's own where that is higher.
+    assert_eq!((place(8.0).clearance_mm(5.0), place(8.0).clearance_mm(12.0)), (10.0, 12.0));
+    // Round the tile the cutter meets no clamp, across its middle line it does.
+    let columns =
+        Library::find("tools", None).expect("comes along").tool("ball-1").expect("in it").columns(16.0);
+    // The shank is wider than the cutter, and above 4 mm of neck lower than the clamps.
+    let setup = place(10.0);
+    let guard = Guard::new(&setup.obstacles, columns);
+    let around =
+        [[-1.0, -1.0, -3.0], [41.0, -1.0, -3.0], [41.0, 41.0, -3.0], [-1.0, 41.0, -3.0], [-1.0, -1.0, -3.0]];
+    assert_eq!(guard.first_met(5, |k| around[k]), None);
+    let met = guard.first_met(2, |k| [[20.0, 20.0, 6.0], [-5.0, 20.0, 6.0]][k]).expect("into the left clamp");
+    assert_eq!((met.what, met.obstacle.as_str()), ("cutter", "left"));
+    // 20 mm deep the holder, 18 mm above the tip, is in it long before the cutter is.
+    let met = guard.first_met(2, |k| [[20.0, 20.0, -12.0], [0.0, 20.0, -12.0]][k]).expect("the holder");
+    assert_eq!(met.what, "holder");
     let left = &place(8.0).obstacles[0].bounds;
     assert_eq!((left.low_mm[0], left.high_mm[0]), (-48.0, -2.0));
     assert_eq!((left.low_mm[1], left.high_mm[1]), (10.0, 30.0));
+}
+
+#[test]
+fn clamps_stand_along_their_side_as_the_file_says() {
+    let (machine, fixture) = (machine("linuxcnc-mill"), fixture("corner-clamps"));
+    let stock = Stock { margin_mm: 8.0, ..stock(Blanks::PerTile) };
+    let tiles =
+        split([40.0, 40.0], Quantum::Cell { cell_mm: 4.0 }, 1.0, &stock, &machine, &fixture).expect("fits");
+    let setup = Setup::place(tiles[0].clone(), [40.0, 40.0], &stock, &machine, &fixture);
+    // The blank runs from -8 to 48: the first clamp begins at its front end, the second ends at its back.
+    let y: Vec<[f64; 2]> =
+        setup.obstacles.iter().map(|o| [o.bounds.low_mm[1], o.bounds.high_mm[1]]).collect();
+    assert_eq!(y, [[-8.0, 4.0], [36.0, 48.0], [-8.0, 4.0], [36.0, 48.0]]);
+}
+
+#[test]
+fn a_fixture_s_largest_blank_limits_the_tiles() {
+    let (machine, vise) = (machine("linuxcnc-mill"), fixture("vise"));
+    let stock = stock(Blanks::PerTile);
+    let tiles =
+        split([200.0, 200.0], Quantum::Cell { cell_mm: 4.0 }, 1.0, &stock, &machine, &vise).expect("fits");
+    // 150 - 6 hold 36 cells of 50, 100 - 6 hold 23.
+    assert_eq!(tiles.iter().map(|t| t.column).max(), Some(1));
+    assert_eq!(tiles.iter().map(|t| t.row).max(), Some(2));
 }

@@ -128,8 +128,32 @@ fn setup(change: &str) -> String {
             let need = ZNeed { depth_mm: 8.3, top_allowance_mm: 0.2, clearance_mm: 5.0 };
             floor_mm("r1c0", need, &stock).err()
         }
-        "stroke" => place().check(&motions(60.0), 0.5, 10.0, &machine).err(),
-        "clamp-height" => place().check(&motions(1.0), 0.5, 5.0, &machine).err(),
+        "stroke" => place().check(&motions(60.0), 0.0, &machine).err(),
+        "stroke-z" => {
+            let deep = Bounds { low_mm: [0.0, 0.0, -41.0], ..motions(0.0) };
+            place().check(&deep, 50.0, &machine).err()
+        }
+        "under-the-blank" => {
+            let deep = Bounds { low_mm: [0.0, 0.0, -10.5], ..motions(0.0) };
+            place().check(&deep, 0.2, &machine).err()
+        }
+        "clamp-near" => place().check_reach(4.5, 5.5, 3.0, stock.margin_mm).err(),
+        "clamp-in-the-tile" => {
+            let near = Stock { margin_mm: 2.0, ..stock };
+            let tile = tiles(&near, cell).expect("fits").swap_remove(0);
+            let setup = Setup::place(tile, [400.0, 400.0], &near, &machine, &fixture);
+            setup.check_reach(1.0, 1.0, 3.0, near.margin_mm).err()
+        }
+        "vise-sheet" => {
+            let vise = Fixture::find("vise", None).expect("comes along");
+            let one = Stock { blanks: Blanks::One, ..stock };
+            split([400.0, 90.0], cell, 1.0, &one, &machine, &vise).err()
+        }
+        "no-usable-area" => {
+            let mut none = fixture.clone();
+            none.border_mm.x = 120.0;
+            split([8.0, 8.0], cell, 1.0, &stock, &machine, &none).err()
+        }
         "reach" => library.tool("ball-0.4").and_then(|tool| tool.check_reach(19.5)).err(),
         "inline-feed" => Tool::inline(Shape::Ball { diameter_mm: 1.0 }, 0.0, 80.0, 20_000.0).err(),
         _ => panic!("unknown change {change}"),

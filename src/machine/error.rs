@@ -60,11 +60,24 @@ pub enum Error {
     )]
     Stroke { tile: String, axis: &'static str, low_mm: f64, high_mm: f64, machine: String, travel_mm: f64 },
     #[error(
-        "\"{name}\" stands {top_mm} mm above the stock of tile {tile}, the clearance plane only {clearance_mm} mm; hint: a larger clearance_mm"
+        "\"{name}\" stands in the way on tile {tile}: {place}, and the cutters go {reach_mm:.3} mm past its edges; hint: margin_mm = {} (it is {margin_mm}), or another fixture",
+        .needed_um.ceil() / 1000.0
     )]
-    Clearance { tile: String, name: String, top_mm: f64, clearance_mm: f64 },
+    InTheWay {
+        tile: String,
+        name: String,
+        place: String,
+        reach_mm: f64,
+        margin_mm: f64,
+        /// The margin in um that would do.
+        needed_um: f64,
+    },
     #[error(
-        "the cutter would run up to {overlap_mm:.3} mm into \"{name}\" ({top_mm} mm above the stock) on tile {tile}; hint: a larger margin_mm or another fixture"
+        "tile {tile} is cut {below_mm:.3} mm below its blank, the fixture allows {sacrificial_mm} mm; hint: a thicker blank, or a fixture with a board to cut into (sacrificial_mm)"
     )]
-    KeepOut { tile: String, name: String, overlap_mm: f64, top_mm: f64 },
+    Under { tile: String, below_mm: f64, sacrificial_mm: f64 },
+    #[error(
+        "the sheet of {length_mm:.3} mm does not fit fixture \"{fixture}\", which takes {most_mm} mm along {axis}; hint: blanks = \"per-tile\", or another fixture"
+    )]
+    Sheet { length_mm: f64, fixture: String, most_mm: f64, axis: &'static str },
 }

@@ -18,7 +18,13 @@ pub struct Fixture {
     pub title: String,
     /// What of the travel is not usable, on each end of an axis.
     pub border_mm: Border,
+    /// Largest blank it takes along X and Y, a vise's opening say; None: what the travel allows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blank_max_mm: Option<Border>,
     pub height_mm: f64,
+    /// How far below the blank's underside a cutter may go: the board under it that is spent.
+    #[serde(default)]
+    pub sacrificial_mm: f64,
     /// How the operator finds the work coordinate system.
     pub wcs_found: String,
     #[serde(default)]
@@ -31,7 +37,7 @@ pub struct Fixture {
     pub keep_out: Vec<KeepOut>,
 }
 
-/// A strip along each end of an axis.
+/// A length along each axis.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Border {
@@ -49,7 +55,7 @@ pub enum Side {
     Back,
 }
 
-/// A clamp in the middle of a side of the blank.
+/// A clamp, jaw, stop or pin on a side of the blank.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clamp {
@@ -61,8 +67,15 @@ pub struct Clamp {
     pub width_mm: f64,
     /// How far it stands out beyond the blank.
     pub out_mm: f64,
-    /// Its height above the blank's top.
+    /// Its height above the blank's top; below 0 for jaws and pins that stay under it.
     pub height_mm: f64,
+    /// Where along the side: 0 begins at its left or front end, 1 ends at the other, 0.5 is the middle.
+    #[serde(default = "middle")]
+    pub along: f64,
+}
+
+fn middle() -> f64 {
+    0.5
 }
 
 /// A box that nothing may enter, in the table's frame.
@@ -95,12 +108,20 @@ impl Fixture {
         source.schema(fixture.schema, 1)?;
         source.within("border_mm.x", fixture.border_mm.x, 0.0, 10_000.0)?;
         source.within("border_mm.y", fixture.border_mm.y, 0.0, 10_000.0)?;
+        if let Some(most) = fixture.blank_max_mm {
+            source.within("blank_max_mm.x", most.x, 0.1, 1e5)?;
+            source.within("blank_max_mm.y", most.y, 0.1, 1e5)?;
+        }
         source.within("height_mm", fixture.height_mm, 0.0, 1000.0)?;
+        source.within("sacrificial_mm", fixture.sacrificial_mm, 0.0, fixture.height_mm)?;
         for (i, clamp) in fixture.clamp.iter().enumerate() {
             source.within(&format!("clamp[{i}].reach_mm"), clamp.reach_mm, 0.0, 1000.0)?;
             source.within(&format!("clamp[{i}].width_mm"), clamp.width_mm, 0.1, 1000.0)?;
             source.within(&format!("clamp[{i}].out_mm"), clamp.out_mm, 0.0, 1000.0)?;
-            source.within(&format!("clamp[{i}].height_mm"), clamp.height_mm, 0.0, 1000.0)?;
+            // What reaches over the blank lies on its top.
+            let lowest = if clamp.reach_mm > 0.0 { 0.0 } else { -1000.0 };
+            source.within(&format!("clamp[{i}].height_mm"), clamp.height_mm, lowest, 1000.0)?;
+            source.within(&format!("clamp[{i}].along"), clamp.along, 0.0, 1.0)?;
         }
         for (i, keep_out) in fixture.keep_out.iter().enumerate() {
             let (low, high) = (keep_out.min_mm, keep_out.max_mm);

@@ -1,5 +1,6 @@
 //! Machines, fixtures, tools, and the split of a part into what a machine can hold.
 
+mod collision;
 mod error;
 mod fixture;
 mod profile;
@@ -8,6 +9,7 @@ mod spindle;
 mod split;
 mod tool;
 
+pub use collision::{Guard, Met};
 pub use error::Error;
 pub use fixture::{Border, Clamp, Fixture, KeepOut, Side};
 pub use profile::{Corner, Machine, Motion, PerAxis, Rate, Spindle, SpindleLaw, Transfer, Travel};

@@ -1,8 +1,8 @@
-use parry3d::bounding_volume::{Aabb, BoundingVolume};
-use parry3d::math::Vector;
-
 use super::fixture::Side;
 use super::{Blanks, Error, Fixture, Machine, Stock, Tile};
+
+/// Room between the clearance plane and the highest clamp.
+const OVER_CLAMPS_MM: f64 = 2.0;
 
 /// Lowest and highest X, Y and Z in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,8 +59,8 @@ impl Setup {
         ];
         let clamps = fixture.clamp.iter().map(|clamp| {
             let across = |axis: usize| {
-                let middle = 0.5 * (low[axis] + high[axis]);
-                [middle - 0.5 * clamp.width_mm, middle + 0.5 * clamp.width_mm]
+                let start = low[axis] + clamp.along * (high[axis] - low[axis] - clamp.width_mm);
+                [start, start + clamp.width_mm]
             };
             let at_low = |axis: usize| [low[axis] - clamp.out_mm, low[axis] + clamp.reach_mm];
             let at_high = |axis: usize| [high[axis] - clamp.reach_mm, high[axis] + clamp.out_mm];
@@ -86,20 +86,53 @@ impl Setup {
         Setup { tile, blank, zero_on_table_mm: zero, obstacles }
     }
 
-    /// Refuses motions of a cutter's tip within `motions` (X and Y of the program, z above the
-    /// stock's top) that leave the travel, or whose cutter and all above it, taken as one column
-    /// of `radius_mm`, could enter a clamp or another keep-out box. Rapids to the first point
-    /// come at `clearance_mm` above the stock from anywhere, so everything has to be lower.
+    /// The plane in mm above the stock's top on which the tool may come from and go to anywhere: `retract_mm`, or
+    /// higher where a clamp stands above that.
+    pub fn clearance_mm(&self, retract_mm: f64) -> f64 {
+        let tops = self.obstacles.iter().map(|obstacle| obstacle.bounds.high_mm[2] + OVER_CLAMPS_MM);
+        tops.fold(retract_mm, f64::max)
+    }
+
+    /// Refuses a tile that a cutter cannot get to for clamps: boxes that stand in the tile, or nearer to it than
+    /// `reach_mm`, how far past the tile's edges the operations cut, the cutter's radius included; with what of a tool is
+    /// wider than its cutter they go up to `widest_mm`, for which the hint asks.
     ///
-    /// The box of all motions stands for the motions: what it refuses may still be free, what it
-    /// passes is.
-    pub fn check(
+    /// Only what stands above the deepest cut counts, `depth_mm` below the stock's top.
+    pub fn check_reach(
         &self,
-        motions: &Bounds,
-        radius_mm: f64,
-        clearance_mm: f64,
-        machine: &Machine,
+        reach_mm: f64,
+        widest_mm: f64,
+        depth_mm: f64,
+        margin_mm: f64,
     ) -> Result<(), Error> {
+        let size = [self.tile.width_mm, self.tile.height_mm];
+        for Obstacle { name, bounds } in &self.obstacles {
+            if bounds.high_mm[2] <= -depth_mm {
+                continue;
+            }
+            let gap = |axis: usize| (-bounds.high_mm[axis]).max(bounds.low_mm[axis] - size[axis]);
+            let gap_mm = gap(0).max(gap(1));
+            if gap_mm < reach_mm {
+                return Err(Error::InTheWay {
+                    tile: self.tile.name.clone(),
+                    name: name.clone(),
+                    place: if gap_mm < 0.0 {
+                        format!("{:.3} mm inside it", -gap_mm)
+                    } else {
+                        format!("{gap_mm:.3} mm from it")
+                    },
+                    reach_mm,
+                    margin_mm,
+                    needed_um: (margin_mm + widest_mm.max(reach_mm) - gap_mm) * 1000.0 - 1e-6,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses motions of a cutter's tip within `motions` (X and Y of the program, z above the stock's top) that leave
+    /// the travel, or go deeper than the blank and what may be cut under it.
+    pub fn check(&self, motions: &Bounds, sacrificial_mm: f64, machine: &Machine) -> Result<(), Error> {
         let tile = || self.tile.name.clone();
         for (axis, travel_mm) in [machine.travel.x_mm, machine.travel.y_mm].into_iter().enumerate() {
             let low_mm = motions.low_mm[axis] + self.zero_on_table_mm[axis];
@@ -110,36 +143,15 @@ impl Setup {
                 return Err(Error::Stroke { tile: tile(), axis, low_mm, high_mm, machine, travel_mm });
             }
         }
-        let column = Bounds {
-            low_mm: [motions.low_mm[0] - radius_mm, motions.low_mm[1] - radius_mm, motions.low_mm[2]],
-            high_mm: [
-                motions.high_mm[0] + radius_mm,
-                motions.high_mm[1] + radius_mm,
-                motions.high_mm[2].max(clearance_mm) + 1000.0,
-            ],
-        };
-        for obstacle in &self.obstacles {
-            let top_mm = obstacle.bounds.high_mm[2];
-            if top_mm >= clearance_mm {
-                let name = obstacle.name.clone();
-                return Err(Error::Clearance { tile: tile(), name, top_mm, clearance_mm });
-            }
-            if aabb(&column).intersects(&aabb(&obstacle.bounds)) {
-                let overlap = |axis: usize| {
-                    let (a, b) = (&column, &obstacle.bounds);
-                    a.high_mm[axis].min(b.high_mm[axis]) - a.low_mm[axis].max(b.low_mm[axis])
-                };
-                let overlap_mm = overlap(0).min(overlap(1));
-                let name = obstacle.name.clone();
-                return Err(Error::KeepOut { tile: tile(), name, overlap_mm, top_mm });
-            }
+        let needed_mm = motions.high_mm[2] - motions.low_mm[2];
+        if needed_mm > machine.travel.z_mm + 1e-9 {
+            let (machine, travel_mm) = (machine.name.clone(), machine.travel.z_mm);
+            return Err(Error::Travel { tile: tile(), needed_mm, machine, travel_mm });
+        }
+        let below_mm = self.blank.low_mm[2] - motions.low_mm[2];
+        if below_mm > sacrificial_mm + 1e-9 {
+            return Err(Error::Under { tile: tile(), below_mm, sacrificial_mm });
         }
         Ok(())
     }
-}
-
-/// In single precision, and a hair larger for it.
-fn aabb(bounds: &Bounds) -> Aabb {
-    let corner = |c: [f64; 3]| Vector::new(c[0] as f32, c[1] as f32, c[2] as f32);
-    Aabb::new(corner(bounds.low_mm), corner(bounds.high_mm)).loosened(1e-3)
 }

@@ -134,6 +134,16 @@ fn counts(
             Blanks::PerTile => (travel[axis] - 2.0 * overrun_mm).min(usable - 2.0 * stock.margin_mm),
             Blanks::One => usable - 2.0 * overrun_mm,
         };
+        let most = fixture.blank_max_mm.map_or(f64::INFINITY, |most| [most.x, most.y][axis]);
+        let blank = size_mm[axis] + 2.0 * stock.margin_mm;
+        let room = match stock.blanks {
+            Blanks::One if blank > most => {
+                let (fixture, axis) = (fixture.name.clone(), ["X", "Y"][axis]);
+                return Err(Error::Sheet { length_mm: blank, fixture, most_mm: most, axis });
+            }
+            Blanks::One => room,
+            Blanks::PerTile => room.min(most - 2.0 * stock.margin_mm),
+        };
         if size_mm[axis] <= room {
             continue;
         }

@@ -89,6 +89,12 @@ impl Tool {
         if shank.radius_mm > self.shape.radius_mm() { vec![shank, nose] } else { vec![nose] }
     }
 
+    /// The whole tool as cylinders that reach up for ever: the cutter from its tip, then [`Tool::cylinders`].
+    pub fn columns(&self, nose_diameter_mm: f64) -> Vec<Cylinder> {
+        let cutter = Cylinder { what: "cutter", radius_mm: self.shape.radius_mm(), from_mm: 0.0 };
+        std::iter::once(cutter).chain(self.cylinders(nose_diameter_mm)).collect()
+    }
+
     /// Refuses a tool whose holder would go below the top of the stock at the deepest point.
     pub fn check_reach(&self, depth_below_stock_mm: f64) -> Result<(), Error> {
         match self.body {

@@ -140,7 +140,7 @@ pub fn check(
 
 /// The library's cutters of distinct shapes, and why some cannot be used on this part.
 fn candidates<'a>(job: &Job, shop: &'a Shop, tiles: &[TileSetup]) -> Result<Vec<Candidate<'a>>, Error> {
-    let needs = tiles.iter().map(|tile| tile.need(job));
+    let needs = tiles.iter().map(|tile| tile.need());
     let depth_mm = needs.map(|need| need.depth_mm + need.top_allowance_mm).fold(0.0, f64::max);
     let mut candidates: Vec<Candidate> = Vec::new();
     let tools = shop.library.tools.iter().chain(&shop.tools);

@@ -17,7 +17,7 @@ use crate::job::{Blanks, Job};
 use crate::machine::{self, Setup};
 use crate::progress::Progress;
 use crate::report::Report;
-use crate::verify::{Blank, Judged, LateralRapid};
+use crate::verify::{self, Blank, BodyHit, Judged, LateralRapid};
 
 /// Pieces of a part are not made shorter than this to save travel in Z.
 const SMALLEST_TILE_MM: f64 = 20.0;
@@ -39,6 +39,8 @@ pub struct TileResult {
     pub verdict: Verdict,
     /// For each post and program, in run order.
     pub lateral_rapids: Vec<Vec<Option<LateralRapid>>>,
+    /// Shanks and holders that run into metal, for each post and program.
+    pub body_hits: Vec<Vec<Option<BodyHit>>>,
     pub maps: crate::report::MapFiles,
     pub map_factor: usize,
     /// Names of the cutters that were tried on the cavities, largest first.
@@ -82,15 +84,18 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
         &shop.stock,
         &shop.machine,
         &shop.fixture,
-        |tile| Ok::<_, Error>(put(tile)?.need(job)),
+        |tile| Ok::<_, Error>(put(tile)?.need()),
     )?;
     let mut setups = Vec::new();
     for tile in &tiles {
         let setup = put(tile)?;
-        let need = setup.need(job);
+        let need = setup.need();
         machine::floor_mm(&tile.name, need, &shop.stock)?;
+        let depth_mm = need.depth_mm + need.top_allowance_mm;
+        let [reach_mm, widest_mm] = plan::reach_mm(job, shop, steepest, depth_mm);
+        setup.setup.check_reach(reach_mm, widest_mm, depth_mm, shop.stock.margin_mm)?;
         for tool in &shop.tools {
-            tool.check_reach(need.depth_mm + need.top_allowance_mm)?;
+            tool.check_reach(depth_mm)?;
         }
         setups.push(setup);
     }
@@ -143,6 +148,10 @@ fn judged(
         .iter()
         .map(|programs| programs.iter().map(|program| program.lateral_rapid(&blank)).collect())
         .collect();
+    progress.begin("shanks", 1);
+    let nose_mm = shop.machine.spindle.nose_diameter_mm;
+    let bodies: Vec<_> = shop.tools.iter().map(|tool| tool.cylinders(nose_mm)).collect();
+    let body_hits = judged.iter().map(|programs| verify::body_hits(&blank, programs, &bodies)).collect();
     let cutters = distinct(reaching(shop).into_iter(), step_mm)?;
     let (names, candidates) = candidates(shop, step_mm)?;
     let steepest = part.whole.steepest();
@@ -171,7 +180,7 @@ fn judged(
     let at = &tile.setup.tile;
     let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;
     drop(judged);
-    Ok(TileResult { tile, posts, verdict, lateral_rapids, maps, map_factor, candidates: names })
+    Ok(TileResult { tile, posts, verdict, lateral_rapids, body_hits, maps, map_factor, candidates: names })
 }
 
 /// What a picture says at its foot.

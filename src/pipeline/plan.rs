@@ -11,16 +11,19 @@ use super::shop::Shop;
 use crate::compensation::Profile;
 use crate::cutter::Shape;
 use crate::job::{self, Job, ZZero};
-use crate::machine::{Bounds, Setup, Tool, ZNeed};
+use crate::machine::{Bounds, Guard, Setup, Tool, ZNeed};
 use crate::post::{self, Dialect};
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::tolerance::Budget;
-use crate::toolpath::{self, Site, finish, rough};
+use crate::toolpath::{self, Retract, Site, finish, rough};
 use crate::verify::{self, Extent, Reading, Timing};
 
 /// Passes between two places where a zigzag program can start again.
 const RESTART_PASSES: usize = 50;
+
+/// Room around a shank that goes below the stock's top.
+const SHANK_ROOM_MM: f64 = 0.2;
 
 /// A tile on the machine: its surface, its blank and the frames between them.
 pub struct TileSetup {
@@ -30,6 +33,8 @@ pub struct TileSetup {
     pub allowance_mm: f64,
     /// The program's Z0 above the tile's highest design point.
     pub z_zero_mm: f64,
+    /// The clearance plane above the blank's top: the job's, or higher for clamps.
+    pub clearance_mm: f64,
 }
 
 /// One program as it was written and read back.
@@ -62,7 +67,8 @@ impl TileSetup {
             ZZero::StockTop => allowance_mm,
             ZZero::PartTop => 0.0,
         };
-        TileSetup { setup, piece, allowance_mm, z_zero_mm }
+        let clearance_mm = setup.clearance_mm(job.machine.clearance_mm);
+        TileSetup { setup, piece, allowance_mm, z_zero_mm, clearance_mm }
     }
 
     pub fn surface(&self) -> &dyn Surface {
@@ -70,11 +76,11 @@ impl TileSetup {
     }
 
     /// The Z that the design asks for, before any path is planned.
-    pub fn need(&self, job: &Job) -> ZNeed {
+    pub fn need(&self) -> ZNeed {
         ZNeed {
             depth_mm: self.surface().top_mm() - self.surface().bottom_mm(),
             top_allowance_mm: self.allowance_mm,
-            clearance_mm: job.machine.clearance_mm,
+            clearance_mm: self.clearance_mm,
         }
     }
 
@@ -93,6 +99,17 @@ fn contact_radius_mm(shape: &Shape, slope: f64) -> f64 {
     }
 }
 
+/// Radius of what of a tool goes below the stock's top where it is cut `cut_mm` deep: past its neck that is the shank.
+fn widest_mm(tool: &Tool, cut_mm: f64) -> f64 {
+    let radius_mm = tool.shape.radius_mm();
+    match tool.body {
+        Some(body) if cut_mm > body.neck_length_mm => {
+            radius_mm.max(0.5 * body.shank_diameter_mm + SHANK_ROOM_MM)
+        }
+        _ => radius_mm,
+    }
+}
+
 /// How far past the tile's edges an operation may go.
 pub fn overrun_mm(job: &Job, shape: &Shape, steepest: [f64; 2]) -> f64 {
     let slope = steepest[0].max(steepest[1]);
@@ -101,6 +118,36 @@ pub fn overrun_mm(job: &Job, shape: &Shape, steepest: [f64; 2]) -> f64 {
         job::Blanks::One => shape.radius_mm(),
     };
     reach_mm + 3.0 * job.part.step_mm
+}
+
+/// Metal beside the tile that roughing takes out of the way of the cutters after operation `index`.
+fn clear_mm(job: &Job, shop: &Shop, index: usize, steepest: [f64; 2], cut_mm: f64) -> f64 {
+    let later = shop.tools[index + 1..].iter();
+    later.map(|tool| widest_mm(tool, cut_mm) + overrun_mm(job, &tool.shape, steepest)).fold(0.0, f64::max)
+}
+
+/// How far past the tile's edges the operations reach with their cutters, in mm: surely, and at most with what of a
+/// tool is wider than its cutter. `cut_mm` is the deepest cut below the stock's top.
+pub fn reach_mm(job: &Job, shop: &Shop, steepest: [f64; 2], cut_mm: f64) -> [f64; 2] {
+    let (mut sure, mut most) = (0.0f64, 0.0f64);
+    for (index, (operation, tool)) in job.operations.iter().zip(&shop.tools).enumerate() {
+        let radius = tool.shape.radius_mm();
+        let (axis_mm, stepover_mm) = match operation.kind {
+            job::Kind::Rough => {
+                let clear = clear_mm(job, shop, index, steepest, cut_mm).min(job.stock.margin_mm);
+                let stepover = operation.stepover_mm.unwrap_or(rough::STEPOVER * 2.0 * radius);
+                (radius.max(clear - radius) + job.part.step_mm, stepover)
+            }
+            job::Kind::Finish => {
+                (overrun_mm(job, &tool.shape, steepest), operation.stepover_mm.unwrap_or(0.1 * radius))
+            }
+        };
+        let shank = tool.body.map_or(0.0, |body| 0.5 * body.shank_diameter_mm);
+        sure = sure.max(axis_mm + radius);
+        // The last row may lie up to a stepover further out.
+        most = most.max(axis_mm + stepover_mm + radius.max(shank));
+    }
+    [sure, most]
 }
 
 /// Plans, writes and reads back every operation of a tile in one dialect; files go under `folder`, the job's staging
@@ -116,7 +163,8 @@ pub fn programs(
     let surface = tile.surface();
     let steepest = surface.steepest();
     let lattice = surface.lattice();
-    let need = tile.need(job);
+    let need = tile.need();
+    let cut_mm = need.depth_mm + need.top_allowance_mm;
     let budget = Budget::split(
         job.limits.gouge_or_default_mm(),
         dialect.path_tolerance_mm + dialect.merge_tolerance_mm,
@@ -130,7 +178,8 @@ pub fn programs(
         margin_mm: job.stock.margin_mm,
         top_allowance_mm: tile.allowance_mm,
         z_zero_mm: tile.z_zero_mm,
-        clearance_mm: job.machine.clearance_mm,
+        clearance_mm: tile.clearance_mm,
+        retract: None,
         unit_mm: dialect.unit_mm,
         budget,
     };
@@ -138,6 +187,10 @@ pub fn programs(
         PostPrograms { dialect: dialect.name.clone(), budget, programs: Vec::new(), passes: Vec::new() };
     for (index, operation) in job.operations.iter().enumerate() {
         let tool = &shop.tools[index];
+        let guard = Guard::new(&tile.setup.obstacles, tool.columns(shop.machine.spindle.nose_diameter_mm));
+        let above_mm = job.machine.clearance_mm;
+        let retract = (above_mm < tile.clearance_mm).then_some(Retract { above_mm, guard: &guard });
+        let site = Site { retract, ..site };
         let refused = |source| Error::Toolpath {
             number: index + 1,
             operation: operation.kind.word(),
@@ -153,11 +206,7 @@ pub fn programs(
         };
         let path = match operation.kind {
             job::Kind::Rough => {
-                let later = &shop.tools[index + 1..];
-                let clear_mm = later
-                    .iter()
-                    .map(|tool| tool.shape.radius_mm() + overrun_mm(job, &tool.shape, steepest))
-                    .fold(0.0, f64::max);
+                let clear_mm = clear_mm(job, shop, index, steepest, cut_mm);
                 let params = rough::Params {
                     shape: tool.shape,
                     stepdown_mm: operation.stepdown_mm.unwrap_or_default(),
@@ -265,7 +314,7 @@ fn write(
             ZZero::PartTop => post::ZZero::PartTop,
         },
         wcs: &job.machine.wcs,
-        clearance_mm: tile.allowance_mm - tile.z_zero_mm + job.machine.clearance_mm,
+        clearance_mm: tile.allowance_mm - tile.z_zero_mm + tile.clearance_mm,
         notes: &[],
     };
     let mut out = BufWriter::with_capacity(1 << 20, File::create(file).map_err(output)?);
@@ -273,11 +322,13 @@ fn write(
     out.flush().map_err(output)
 }
 
+/// A place of the program as the setup has it: z above the stock's top.
+pub fn over_stock(place_mm: [f64; 3], tile: &TileSetup) -> [f64; 3] {
+    let [x, y, z] = place_mm;
+    [x, y, z + tile.z_zero_mm - tile.allowance_mm]
+}
+
 /// The box of a program's motions as the setup checks it: z above the stock's top.
 pub fn bounds_over_stock(extent: &Extent, tile: &TileSetup) -> Bounds {
-    let shift_mm = tile.z_zero_mm - tile.allowance_mm;
-    let mut bounds = Bounds { low_mm: extent.low_mm, high_mm: extent.high_mm };
-    bounds.low_mm[2] += shift_mm;
-    bounds.high_mm[2] += shift_mm;
-    bounds
+    Bounds { low_mm: over_stock(extent.low_mm, tile), high_mm: over_stock(extent.high_mm, tile) }
 }

@@ -10,6 +10,7 @@ use super::{Error, WITHIN, light, pages};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
 use crate::job::{Form, Job};
+use crate::machine::Guard;
 use crate::report::cavity_list::{self, TileCavities};
 use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
 use crate::tolerance::Budget;
@@ -145,7 +146,7 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
         }
         for (index, program) in result.posts[post].programs.iter().enumerate() {
             let cut = &result.verdict.cuts[post][index];
-            bad.extend(of_motions(job, shop, result, post, index));
+            bad.extend(of_motions(shop, result, post, index));
             found.extend(of_wear(shop, program, cut).into_iter().map(|f| f.on(&name)));
         }
         if !bad.is_empty() {
@@ -166,7 +167,7 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
 }
 
 /// Errors of one program's motions.
-fn of_motions(job: &Job, shop: &Shop, result: &TileResult, post: usize, index: usize) -> Vec<Finding> {
+fn of_motions(shop: &Shop, result: &TileResult, post: usize, index: usize) -> Vec<Finding> {
     let tile = &result.tile;
     let name = &tile.setup.tile.name;
     let program = &result.posts[post].programs[index];
@@ -175,17 +176,28 @@ fn of_motions(job: &Job, shop: &Shop, result: &TileResult, post: usize, index: u
     let mut found = Vec::new();
     let tool = &shop.tools[program.operation];
     let bounds = plan::bounds_over_stock(&program.extent, tile);
-    // The cutter from its tip up, then shank and holder from where they begin.
-    let body = tool.cylinders(shop.machine.spindle.nose_diameter_mm);
-    let columns = body.iter().map(|cylinder| (cylinder.radius_mm, cylinder.from_mm));
-    for (radius_mm, from_mm) in std::iter::once((tool.shape.radius_mm(), 0.0)).chain(columns) {
-        let mut raised = bounds;
-        raised.low_mm[2] += from_mm;
-        let checked = tile.setup.check(&raised, radius_mm, job.machine.clearance_mm, &shop.machine);
-        if let Err(refusal) = checked {
-            found.push(finding(Severity::Error, "travel", format!("{file}: {refusal}")).on(name));
-            break;
-        }
+    let checked = tile.setup.check(&bounds, shop.fixture.sacrificial_mm, &shop.machine);
+    if let Err(refusal) = checked {
+        found.push(finding(Severity::Error, "travel", format!("{file}: {refusal}")).on(name));
+    }
+    let guard = Guard::new(&tile.setup.obstacles, tool.columns(shop.machine.spindle.nose_diameter_mm));
+    let motions = &program.reading.motions;
+    let met = guard.first_met(motions.len(), |index| plan::over_stock(motions[index].to_mm, tile));
+    if let Some(met) = met {
+        let message = format!(
+            "{file}:{}: the {} of {} runs into \"{}\", {:.3} mm below its top ({} mm above the stock); hint: a larger margin_mm, another fixture or a tool that sticks out further",
+            motions[met.motion].line, met.what, tool.name, met.obstacle, met.below_mm, met.top_mm
+        );
+        let place = result.in_part([met.at_mm[0], met.at_mm[1]]);
+        found.push(finding(Severity::Error, "clamp", message).on(name).at(&place));
+    }
+    if let Some(hit) = result.body_hits[post][index] {
+        let message = format!(
+            "{file}:{}: the {} of {} is {:.3} mm too deep in the metal beside the cutter; hint: a tool with a longer neck, an operation that clears more before it, or level = \"plane\"",
+            hit.line, hit.what, tool.name, hit.depth_mm
+        );
+        let place = result.in_part([hit.at_mm[0], hit.at_mm[1]]);
+        found.push(finding(Severity::Error, "holder", message).on(name).at(&place));
     }
     if let Some(bite) = cut.rapid {
         let message =

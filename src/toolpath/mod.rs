@@ -72,11 +72,21 @@ pub struct Site<'a> {
     pub top_allowance_mm: f64,
     /// The program's Z0 above the tile's highest design point, in mm.
     pub z_zero_mm: f64,
-    /// The retract plane above the blank's top, in mm.
+    /// The clearance plane above the blank's top, in mm: the way from and to anywhere is free there.
     pub clearance_mm: f64,
+    /// A lower plane between passes, where clamps make the clearance plane a high one.
+    pub retract: Option<Retract<'a>>,
     /// mm per unit of the controller's grid.
     pub unit_mm: f64,
     pub budget: Budget,
+}
+
+/// The retract plane, for ways on which nothing stands.
+#[derive(Clone, Copy)]
+pub struct Retract<'a> {
+    /// Above the blank's top, in mm.
+    pub above_mm: f64,
+    pub guard: &'a crate::machine::Guard,
 }
 
 /// Receives the part of the work that is done, 0 .. 1.

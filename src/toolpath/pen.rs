@@ -1,23 +1,39 @@
 //! Writes moves: what rises, travels and descends between passes.
 
-use super::{GridPoint, Kind, Move, Site, Toolpath};
+use super::{GridPoint, Kind, Move, Retract, Site, Toolpath};
 
 /// Rapids stop this far above what may stand below them, in mm.
 const APPROACH_MM: f64 = 0.5;
 
-pub(super) struct Pen {
+/// A link on the retract plane keeps this far from clamps, in mm.
+const SPARE_MM: f64 = 1.0;
+
+/// Every so many passes begin on the clearance plane whatever stands, so that the program can start again there.
+const RESTART_PASSES: usize = 50;
+
+pub(super) struct Pen<'a> {
     path: Toolpath,
     at: Option<GridPoint>,
+    begun: usize,
     clearance: i32,
+    /// A lower plane in units, where there is one.
+    retract: Option<(i32, Retract<'a>)>,
+    /// The program's zero above the stock's top, in mm.
+    zero_mm: f64,
     top: i32,
     approach: i32,
 }
 
-impl Pen {
-    pub(super) fn new(site: &Site) -> Pen {
+impl<'a> Pen<'a> {
+    pub(super) fn new(site: &Site<'a>) -> Pen<'a> {
         Pen {
             path: Toolpath { unit_mm: site.unit_mm, ..Toolpath::default() },
             at: None,
+            begun: 0,
+            retract: site
+                .retract
+                .map(|plane| (site.unit_above(site.top_allowance_mm + plane.above_mm), plane)),
+            zero_mm: site.z_zero_mm - site.top_allowance_mm,
             clearance: site.unit_above(site.top_allowance_mm + site.clearance_mm),
             top: site.unit_above(site.top_allowance_mm),
             approach: (APPROACH_MM / site.unit_mm).ceil() as i32,
@@ -32,17 +48,36 @@ impl Pen {
     /// Retracts, travels to above `to` and comes down to it. `cleared` is the height in units up to which
     /// nothing stands there.
     pub(super) fn begin(&mut self, to: GridPoint, cleared: i32) {
+        let plane = self.plane(to);
         if let Some(at) = self.at {
-            self.go(Kind::Rapid, [at[0], at[1], self.clearance]);
+            self.go(Kind::Rapid, [at[0], at[1], plane]);
         }
-        self.path.pass_starts.push(self.path.moves.len());
+        if plane == self.clearance {
+            self.path.pass_starts.push(self.path.moves.len());
+        }
+        self.begun += 1;
         // Named even if the cutter stands there already: a program may start again here.
-        let over = [to[0], to[1], self.clearance];
+        let over = [to[0], to[1], plane];
         self.path.moves.push(Move { kind: Kind::Rapid, to: over });
         self.at = Some(over);
-        let approach = (cleared.min(self.top) + self.approach).min(self.clearance).max(to[2]);
+        let approach = (cleared.min(self.top) + self.approach).min(plane).max(to[2]);
         self.go(Kind::Rapid, [to[0], to[1], approach]);
         self.go(Kind::Plunge, to);
+    }
+
+    /// The plane in units for the way from where the cutter stands to above `to`: the lowest on which no part of the
+    /// tool comes near what stands in the way.
+    fn plane(&self, to: GridPoint) -> i32 {
+        let (Some(at), Some((retract, plane))) = (self.at, self.retract) else { return self.clearance };
+        if self.begun.is_multiple_of(RESTART_PASSES) {
+            return self.clearance;
+        }
+        let place = |p: GridPoint| {
+            let [x, y, z] = [p[0], p[1], retract].map(|units| f64::from(units) * self.path.unit_mm);
+            [x, y, z + self.zero_mm]
+        };
+        let near = plane.guard.meets(place(at), place(to), SPARE_MM);
+        if near { self.clearance } else { retract.min(self.clearance) }
     }
 
     /// A straight cut; straight down it is a plunge.

@@ -22,7 +22,7 @@ const SLACK_MM: f64 = 0.01;
 const LONGEST_STEPOVERS: f64 = 8.0;
 
 /// Part of the diameter between rows, if it is not given.
-const STEPOVER: f64 = 0.4;
+pub const STEPOVER: f64 = 0.4;
 
 /// What a roughing operation asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]

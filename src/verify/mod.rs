@@ -1,6 +1,7 @@
 //! The judge: reads a program's text back by its own interpreters, cuts it through the stock in
 //! simulation, and times it. It shares no code with what planned or wrote the program.
 
+mod body;
 mod contact;
 mod error;
 mod gcode;
@@ -11,6 +12,7 @@ mod sweep;
 mod text;
 mod time;
 
+pub use body::{BodyHit, body_hits};
 pub use error::{Error, Place};
 pub use judged::{Blank, Judged, LateralRapid};
 pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary, Travel};
