@@ -23,6 +23,15 @@ impl Reachable {
         (self.y[1] - self.y[0] + 0.5) * (1.0 + (self.x[1] - self.x[0]) / LANES as f64)
     }
 
+    /// The box around both.
+    #[inline(always)]
+    pub fn hull(&self, other: &Reachable) -> Reachable {
+        Reachable {
+            x: [less(self.x[0], other.x[0]), greater(self.x[1], other.x[1])],
+            y: [less(self.y[0], other.y[0]), greater(self.y[1], other.y[1])],
+        }
+    }
+
     #[inline(always)]
     fn is_empty(&self) -> bool {
         self.x[0] > self.x[1] || self.y[0] > self.y[1]
@@ -72,15 +81,7 @@ impl Ball {
     #[inline(always)]
     pub fn reachable(&self, rises: &Rises) -> Option<Reachable> {
         let slopes = self.slopes(rises, 1.0);
-        // Where the neighbour lies outside the cutter it bounds nothing, and with nothing known of
-        // the other axis that may be so from a sample before the axis on.
-        let start = |next: f64, before: f64| {
-            let low = less(next * self.radius, 0.0) - 1.0 - ROOM;
-            let high = greater(before * self.radius, 0.0) + 1.0 + ROOM;
-            [greater(low, -self.radius), less(high, self.radius)]
-        };
-        let mut at =
-            Reachable { x: start(slopes.x_next, slopes.x_before), y: start(slopes.y_next, slopes.y_before) };
+        let mut at = self.start_of(&slopes);
         for _ in 0..6 {
             let before = at.lattice_points();
             at = self.sweep(at, &slopes)?;
@@ -90,6 +91,29 @@ impl Ball {
             }
         }
         Some(at)
+    }
+
+    /// A box for samples with these rises without sweeps: wide, and never empty.
+    #[inline(always)]
+    pub fn start(&self, rises: &Rises) -> Reachable {
+        self.start_of(&self.slopes(rises, 1.0))
+    }
+
+    /// Where the neighbour lies outside the cutter it bounds nothing, and with nothing known of
+    /// the other axis that may be so from a sample before the axis on.
+    #[inline(always)]
+    fn start_of(&self, slopes: &Slopes) -> Reachable {
+        let start = |next: f64, before: f64| {
+            let low = less(next * self.radius, 0.0) - 1.0 - ROOM;
+            let high = greater(before * self.radius, 0.0) + 1.0 + ROOM;
+            [greater(low, -self.radius), less(high, self.radius)]
+        };
+        Reachable { x: start(slopes.x_next, slopes.x_before), y: start(slopes.y_next, slopes.y_before) }
+    }
+
+    /// Room for the rounding of boxes in f32 and of the table's entries, in samples.
+    pub fn room(&self) -> f64 {
+        0.02 + self.radius * self.radius * 5e-7
     }
 
     /// Tightens the box of one sample (at padded column `i`) by neighbours further off: what tames

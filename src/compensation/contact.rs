@@ -7,31 +7,40 @@
 //! losses ends at a pair that is kept, so the maximum over the kept pairs is the maximum over
 //! all, to the bit. (The raster form of the contact-point search of Lou, Jiang and Scott,
 //! Proc. R. Soc. A 469 (2013) 20130150.)
+//!
+//! A block on one facet has one box of offsets, of an entry or two. Where a block has an edge in
+//! it, its samples have their own; most fall into the two boxes of the facets beside, and those on
+//! the edge are left, with boxes as long as the arc over which the ball rolls around it.
 
 use super::Profile;
 use super::ball::{Ball, Reachable};
+use super::blocks::{Block, Boxes, Moderate, ROWS, measure};
 use super::brute;
 use super::field::{Field, PAD, Targets};
-use super::lanes::{LANES, Vectors, raise, whole_groups, widest};
+use super::interval::Beside;
+use super::lanes::{LANES, Vectors, widest};
 use super::pairs::Pairs;
-use super::slopes::{CELL, Rises, RowRises};
-use super::stencil::ArcRef;
-use std::marker::PhantomData;
+use super::runs::{Run, raise_run, row_work};
+use super::slopes::Rises;
+use super::unboxed;
 
-/// Samples of a row that are first tried as one run.
-const BLOCK: usize = 4 * CELL;
+/// What bounding a block costs, in groups of lanes.
+const BLOCK_WORK: usize = 60;
 
-/// Groups of lanes that a run may cost before it is split.
-const CHEAP: usize = 6;
-
-/// What bounding one run and finding its rows costs, in groups of lanes.
-const RUN_WORK: f64 = 60.0;
-
-/// What looking at far neighbours costs, in groups of lanes.
-const FAR_WORK: f64 = 400.0;
+/// What looking at far neighbours costs.
+const FAR_WORK: usize = 400;
 
 /// Groups of lanes from which a sample's box is worth tightening by far neighbours.
 pub(super) const WIDE: f64 = 100.0;
+
+/// Lattice points of a block's box, at most, for it to be used for all its samples.
+const FEW: f64 = 9.0;
+
+/// Samples of a block that share a box, at least, for it to be used for all of them.
+const MANY: u32 = 20;
+
+/// Rows of a box from which each is narrowed by itself.
+const TALL: f64 = 3.0;
 
 widest! {
     /// Raises the targets by every sample of the field that can touch a cutter there, or sets
@@ -47,46 +56,34 @@ pub(super) fn body<V: Vectors, P: Pairs>(
     out: &mut Targets,
     given_up: &mut bool,
 ) {
-    let with_y = pairs.is_lattice();
-    let mut rises = RowRises::new(field);
     let ball = Ball { radius: profile.radius(), step_mm: profile.step_mm(), slack_mm: pairs.slack_mm() };
-    let columns = rises.cells().len();
+    let every_tap = brute::work(profile, out);
+    if !pairs.is_lattice() {
+        *given_up = !unboxed::contacts::<V, P>(field, pairs, &ball, every_tap, out);
+        return;
+    }
     let mut search = Search::<V, P> {
         field,
         pairs,
         ball,
+        moderate: Moderate::new(&ball),
+        boxes: Boxes::new(),
+        whole: pairs.is_whole(),
         alike_mm: (0.4 * ball.step_mm / ball.radius) as f32,
-        work: 0.0,
-        starts: Vec::new(),
-        known: vec![Known::default(); columns + 2],
-        known_blocks: vec![Known::default(); columns.div_ceil(BLOCK / CELL)],
-        vectors: PhantomData,
+        work: 0,
+        known: vec![Known::default(); field.columns.div_ceil(LANES)],
     };
-    let every_tap = brute::work(profile, out);
-    for a in 0..field.rows as i64 {
+    for a in (0..field.rows).step_by(ROWS) {
         let part = a as f64 / field.rows as f64;
-        if part > 0.1 && search.work > part * every_tap {
+        if part > 0.1 && search.work as f64 > part * every_tap {
             *given_up = true;
             return;
         }
-        rises.measure(field, a, with_y);
-        search.starts.clear();
-        for (block, cells) in rises.cells().chunks(BLOCK / CELL).enumerate() {
-            let all = cells.iter().fold(Rises::NO_SAMPLE, |all, cell| all.with(*cell));
-            if all.is_no_sample() {
-                continue;
-            }
-            let first = block * BLOCK;
-            if with_y {
-                search.boxed_block(a, first, cells, all, out);
-            } else {
-                search.unboxed_block(a, first, cells, all, out);
-            }
-        }
+        search.rows(a as i64, ROWS.min(field.rows - a), out);
     }
 }
 
-/// The small box of some rises, kept because the next row is likely to lie on the same facet.
+/// The small box of some rises, kept because the next block is likely to lie on the same facet.
 #[derive(Clone, Copy)]
 struct Known {
     rises: Rises,
@@ -99,298 +96,233 @@ impl Default for Known {
     }
 }
 
+/// Blocks side by side with one box.
+struct Level {
+    first: usize,
+    len: usize,
+    known: Known,
+}
+
 struct Search<'a, V: Vectors, P: Pairs> {
     field: &'a Field,
     pairs: &'a P,
     ball: Ball,
+    moderate: Option<Moderate>,
+    boxes: Boxes<V>,
+    /// Whether all offsets are whole samples.
+    whole: bool,
     /// Rises that differ by less move a contact by less than a sample.
     alike_mm: f32,
     /// Done so far, in groups of lanes.
-    work: f64,
-    /// Where the last block's contacts lay, by target row: the next block's lie close by.
-    starts: Vec<[i32; 2]>,
-    /// By cell, from the rows before; the first and last are no cell's.
+    work: usize,
+    /// By column of blocks, from the rows before.
     known: Vec<Known>,
-    known_blocks: Vec<Known>,
-    vectors: PhantomData<V>,
 }
 
 impl<V: Vectors, P: Pairs> Search<'_, V, P> {
-    /// The box of rises, from `known` if they lie within its own; a box of few points is kept
-    /// there, made for rises somewhat wider.
+    /// All blocks of some rows.
     #[inline(always)]
-    fn reachable(
-        ball: &Ball,
-        rises: &Rises,
-        known: &mut Known,
-        wider_mm: f32,
-        few: f64,
-    ) -> Option<Reachable> {
-        if known.rises.holds(rises) {
-            return Some(known.at);
-        }
-        let wider = rises.wider(wider_mm);
-        let at = ball.reachable(&wider)?;
-        if at.lattice_points() <= few {
-            *known = Known { rises: wider, at };
-        }
-        Some(at)
-    }
-
-    #[inline(always)]
-    fn boxed_block(&mut self, a: i64, first: usize, cells: &[Rises], all: Rises, out: &mut Targets) {
-        let wider_mm = 0.25 * self.alike_mm;
-        let known = &mut self.known_blocks[first / BLOCK];
-        // Slopes this far apart make no small box; finding out by trying costs more.
-        let promising = all.spread() <= 4.0 * self.alike_mm;
-        if promising {
-            match Self::reachable(&self.ball, &all, known, wider_mm, 4.5) {
-                None => return,
-                Some(at) if at.lattice_points() <= 4.5 => {
-                    return self.boxed_run(a, first, cells.len() * CELL, all, at, out);
-                }
-                Some(_) => {}
-            }
-        }
-        for (c, cell) in cells.iter().enumerate() {
-            if cell.is_no_sample() {
+    fn rows(&mut self, a: i64, rows: usize, out: &mut Targets) {
+        let mut level = Level { first: 0, len: 0, known: Known::default() };
+        for column in 0..self.known.len() {
+            let block = Block { a, first: column * LANES, rows };
+            let Some(all) = measure::<V>(self.field, block) else {
+                self.raise_level(a, rows, &mut level, out);
                 continue;
-            }
-            let first = first + c * CELL;
-            if cell.spread() > 8.0 * self.alike_mm {
-                self.samples(a, first, out);
-                continue;
-            }
-            let known = &mut self.known[first / CELL + 1];
-            match Self::reachable(&self.ball, cell, known, wider_mm, 6.5) {
-                None => {}
-                Some(at) if at.lattice_points() <= 6.5 => self.boxed_run(a, first, CELL, *cell, at, out),
-                Some(_) => self.samples(a, first, out),
-            }
-        }
-    }
-
-    /// The samples of one cell, in runs of about the same slope.
-    #[inline(always)]
-    fn samples(&mut self, a: i64, first: usize, out: &mut Targets) {
-        let mut i = 0;
-        while i < CELL {
-            let mut rises = Rises::of(self.field, a, PAD + first + i, true);
-            if rises.is_no_sample() {
-                i += 1;
-                continue;
-            }
-            let mut end = i + 1;
-            while end < CELL && rises.spread() <= self.alike_mm {
-                let more = rises.with(Rises::of(self.field, a, PAD + first + end, true));
-                if more.spread() > self.alike_mm {
-                    break;
-                }
-                rises = more;
-                end += 1;
-            }
-            // The facets left and right of an edge were known to the cells beside it.
-            let cell = first / CELL + 1;
-            let known = [cell - 1, cell, cell + 1].map(|at| self.known[at]);
-            let at = match known.iter().find(|known| known.rises.holds(&rises)) {
-                Some(known) => Some(known.at),
-                None => self.ball.reachable(&rises),
             };
-            if let Some(at) = at {
-                self.boxed_run(a, first + i, end - i, rises, at, out);
-            }
-            i = end;
-        }
-    }
-
-    /// One run whose contacts lie in a box.
-    #[inline(always)]
-    fn boxed_run(
-        &mut self,
-        a: i64,
-        first: usize,
-        len: usize,
-        rises: Rises,
-        at: Reachable,
-        out: &mut Targets,
-    ) {
-        self.work += RUN_WORK + at.groups() * len as f64;
-        let at = if len == 1 && at.groups() > WIDE {
-            self.work += FAR_WORK;
-            match self.ball.far_neighbours(self.field, a, PAD + first, at) {
-                Some(at) => at,
-                None => return,
-            }
-        } else {
-            at
-        };
-        for b in self.pairs.targets(a, at.y[0], at.y[1]) {
-            let Some(arc) = self.pairs.arc(a, b) else { continue };
-            let fx = self.pairs.fx(a, b);
-            let mut lo = ((at.x[0] - fx).ceil() as i32).max(arc.arc.lo);
-            let mut hi = ((at.x[1] - fx).floor() as i32).min(arc.arc.hi);
-            while lo <= hi && self.rises_right(&arc, lo, rises.x_next) {
-                lo += 1;
-            }
-            while lo <= hi && self.falls_left(&arc, hi, rises.x_before) {
-                hi -= 1;
-            }
-            let above = self.pairs.arc(a + 1, b);
-            let below = self.pairs.arc(a - 1, b);
-            let out_of_y = |dx: i32| {
-                let beaten = |by: &Option<ArcRef>, rise: f32| {
-                    by.as_ref().is_some_and(|by| {
-                        dx >= by.arc.lo && dx <= by.arc.hi && rise - self.give(rise) > arc.s(dx) - by.s(dx)
-                    })
-                };
-                beaten(&above, rises.y_next) || beaten(&below, -rises.y_before)
-            };
-            while lo <= hi && out_of_y(lo) {
-                lo += 1;
-            }
-            while lo <= hi && out_of_y(hi) {
-                hi -= 1;
-            }
-            if lo <= hi {
-                self.touch(a, b, &arc, first, len, [lo, hi], out);
-            }
-        }
-    }
-
-    /// What a rise may be off by.
-    #[inline(always)]
-    fn give(&self, rise_mm: f32) -> f32 {
-        self.ball.slack_mm + rise_mm.abs() * f32::EPSILON
-    }
-
-    /// Whether the next sample always beats this one at dx.
-    #[inline(always)]
-    fn rises_right(&self, arc: &ArcRef, dx: i32, rise: f32) -> bool {
-        dx < arc.arc.hi && rise - self.give(rise) > arc.s(dx) - arc.s(dx + 1)
-    }
-
-    /// Whether the sample before always beats this one at dx.
-    #[inline(always)]
-    fn falls_left(&self, arc: &ArcRef, dx: i32, rise: f32) -> bool {
-        dx > arc.arc.lo && rise + self.give(rise) < arc.s(dx - 1) - arc.s(dx)
-    }
-
-    /// The dx at which samples with these rises can touch: s along a row is concave, so they are
-    /// an interval. `near` is where to look first.
-    #[inline(always)]
-    fn interval(&self, arc: &ArcRef, rises: &Rises, near: [i32; 2]) -> [i32; 2] {
-        let mut lo = near[0].clamp(arc.arc.lo, arc.arc.hi);
-        if self.rises_right(arc, lo, rises.x_next) {
-            lo += 1;
-            while self.rises_right(arc, lo, rises.x_next) {
-                lo += 1;
-            }
-        } else {
-            while lo > arc.arc.lo && !self.rises_right(arc, lo - 1, rises.x_next) {
-                lo -= 1;
-            }
-        }
-        let mut hi = near[1].clamp(arc.arc.lo, arc.arc.hi);
-        if self.falls_left(arc, hi, rises.x_before) {
-            hi -= 1;
-            while self.falls_left(arc, hi, rises.x_before) {
-                hi -= 1;
-            }
-        } else {
-            while hi < arc.arc.hi && !self.falls_left(arc, hi + 1, rises.x_before) {
-                hi += 1;
-            }
-        }
-        [lo, hi]
-    }
-
-    /// A block of which only dx is bounded: every target row in reach.
-    #[inline(always)]
-    fn unboxed_block(&mut self, a: i64, first: usize, cells: &[Rises], all: Rises, out: &mut Targets) {
-        let targets = self.pairs.targets(a, -self.ball.radius - 1.0, self.ball.radius + 1.0);
-        if self.starts.len() < targets.len() {
-            self.starts.resize(targets.len(), [0, 0]);
-        }
-        let from = targets.start;
-        for b in targets {
-            let Some(arc) = self.pairs.arc(a, b) else { continue };
-            let near = self.interval(&arc, &all, self.starts[b - from]);
-            self.starts[b - from] = near;
-            let [lo, hi] = near;
-            if lo > hi {
+            if level.len > 0 && level.known.rises.holds(&all) {
+                level.len += LANES;
                 continue;
             }
-            let groups = (hi - lo + 1) as usize * (BLOCK / LANES);
-            if groups <= 2 * CHEAP {
-                self.touch(a, b, &arc, first, cells.len() * CELL, near, out);
-                continue;
-            }
-            for (c, cell) in cells.iter().enumerate() {
-                if cell.is_no_sample() {
-                    continue;
+            let known = self.known[column];
+            let known = if known.rises.holds(&all) { Some(known) } else { self.one_box(&all) };
+            match known {
+                Some(known) => {
+                    self.known[column] = known;
+                    self.raise_level(a, rows, &mut level, out);
+                    level = Level { first: block.first, len: LANES, known };
                 }
-                let [lo, hi] = self.interval(&arc, cell, near);
-                if lo > hi {
-                    continue;
-                }
-                let first = first + c * CELL;
-                if (hi - lo) as usize <= CHEAP {
-                    self.touch(a, b, &arc, first, CELL, [lo, hi], out);
-                    continue;
-                }
-                for i in first..first + CELL {
-                    let rises = Rises::of(self.field, a, PAD + i, false);
-                    if !rises.is_no_sample() {
-                        let [lo, hi] = self.interval(&arc, &rises, [lo, hi]);
-                        if lo <= hi {
-                            self.touch(a, b, &arc, i, 1, [lo, hi], out);
-                        }
+                None => {
+                    self.raise_level(a, rows, &mut level, out);
+                    if self.in_reach(block, &all) {
+                        self.split(block, out);
                     }
                 }
             }
         }
+        self.raise_level(a, rows, &mut level, out);
     }
 
-    /// Samples `first .. first + len` of row `a` at offsets `lo ..= hi`: raises row `b`.
+    /// The box of a block, if it is small.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    fn touch(
-        &self,
-        a: i64,
-        b: usize,
-        arc: &ArcRef,
-        first: usize,
-        len: usize,
-        [lo, hi]: [i32; 2],
-        out: &mut Targets,
-    ) {
-        let shift = self.pairs.shift(b);
-        let columns = out.columns as i64;
-        let row = self.field.row(a);
-        let to = out.row_mut(b);
-        let width = (hi - lo + 1) as usize;
-        if width * len.div_ceil(LANES) <= len * width.div_ceil(LANES) {
-            for dx in lo..=hi {
-                let origin = first as i64 - shift - dx as i64;
-                let start = origin.max(0);
-                let end = (origin + len as i64).min(columns);
-                if start < end {
-                    let n = whole_groups((end - start) as usize);
-                    let from = &row[(PAD as i64 + start + shift + dx as i64) as usize..][..n];
-                    raise::<V>(&mut to[start as usize..][..n], from, arc.s(dx));
-                }
+    fn one_box(&self, all: &Rises) -> Option<Known> {
+        if all.spread() > 4.0 * self.alike_mm {
+            return None;
+        }
+        let rises = all.wider(0.25 * self.alike_mm);
+        match self.ball.reachable(&rises) {
+            None => Some(Known { rises, at: Reachable { x: [1.0, 0.0], y: [1.0, 0.0] } }),
+            Some(at) if at.lattice_points() <= FEW => Some(Known { rises, at }),
+            Some(_) => None,
+        }
+    }
+
+    /// Whether samples of this block may reach any target.
+    #[inline(always)]
+    fn in_reach(&self, block: Block, all: &Rises) -> bool {
+        let [low, high] = self.ball.start(all).y;
+        let last = block.a + block.rows as i64 - 1;
+        let (first, last) = (self.pairs.targets(block.a, low, high), self.pairs.targets(last, low, high));
+        first.start < last.end || !first.is_empty()
+    }
+
+    #[inline(always)]
+    fn raise_level(&mut self, a: i64, rows: usize, level: &mut Level, out: &mut Targets) {
+        if level.len > 0 {
+            let at = level.known.at;
+            self.work += BLOCK_WORK;
+            for r in 0..rows as i64 {
+                let run = Run { a: a + r, first: level.first, len: level.len };
+                raise_run::<V, P>(self.field, self.pairs, run, &at, out, None);
             }
-        } else {
-            for i in first..first + len {
-                let origin = i as i64 - shift;
-                let start = (origin - hi as i64).max(0);
-                let end = (origin - lo as i64 + 1).min(columns);
-                if start < end {
-                    let n = whole_groups((end - start) as usize);
-                    let from = &arc.values[arc.index((origin - start) as i32)..][..n];
-                    raise::<V>(&mut to[start as usize..][..n], from, row[PAD + i]);
+            level.len = 0;
+        }
+    }
+
+    /// A block whose samples have boxes of their own.
+    #[inline(always)]
+    fn split(&mut self, block: Block, out: &mut Targets) {
+        self.work += 2 * BLOCK_WORK;
+        match &self.moderate {
+            Some(moderate) => self.boxes.fill(self.field, block, moderate, self.whole),
+            None => self.boxes.all_steep(self.field, block),
+        }
+        if self.boxes.any_steep != 0 {
+            self.work += 2 * BLOCK_WORK;
+            self.boxes.fill_steep(self.field, block, &self.ball, self.whole);
+        }
+        let mut small = self.boxes.small(block.rows, if self.whole { 1.0 } else { 1.6 });
+        let mut tries = 4;
+        while tries > 0 && count(&small) >= MANY {
+            tries -= 1;
+            let mut r = 0;
+            while small[r] == 0 {
+                r += 1;
+            }
+            let lane = small[r].trailing_zeros() as usize;
+            let seed = self.boxes.at(r, lane);
+            let around =
+                Reachable { x: [seed.x[0] - 1.0, seed.x[1] + 1.0], y: [seed.y[0] - 1.0, seed.y[1] + 1.0] };
+            let these = self.boxes.within(&small, &around);
+            if count(&these) < MANY {
+                small[r] &= small[r] - 1;
+                continue;
+            }
+            let hull = self.boxes.hull(&these);
+            for (r, these) in these.iter().enumerate() {
+                if *these != 0 {
+                    small[r] &= !these;
+                    self.boxes.boxed[r] &= !these;
+                    let first = block.first + these.trailing_zeros() as usize;
+                    let len = block.first + LANES - these.leading_zeros() as usize - first;
+                    let run = Run { a: block.a + r as i64, first, len };
+                    raise_run::<V, P>(self.field, self.pairs, run, &hull, out, None);
                 }
             }
         }
+        for r in 0..block.rows {
+            if self.boxes.boxed[r] != 0 {
+                self.singles(block, r, out);
+            }
+        }
+    }
+
+    /// The samples of a row of a block that are left, in runs of nearly one box.
+    #[inline(always)]
+    fn singles(&mut self, block: Block, r: usize, out: &mut Targets) {
+        let a = block.a + r as i64;
+        let mut bits = self.boxes.boxed[r];
+        let mut open: Option<Group> = None;
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let first = block.first + lane;
+            let rises = Rises::of(self.field, a, PAD + first, true);
+            let mut at = Some(self.boxes.at(r, lane));
+            if let Some(wide) = at
+                && wide.x[1] - wide.x[0] > 4.0
+                && wide.groups() > WIDE
+            {
+                self.work += FAR_WORK;
+                at = self.ball.far_neighbours(self.field, a, PAD + first, wide);
+            }
+            let Some(at) = at else { continue };
+            let one = Group::new(first, rises, at);
+            open = match open {
+                None => Some(one),
+                Some(group) => {
+                    let both = group.with(&one);
+                    if both.work <= group.work + one.work {
+                        Some(both)
+                    } else {
+                        self.raise_group(a, &group, out);
+                        Some(one)
+                    }
+                }
+            };
+        }
+        if let Some(group) = open {
+            self.raise_group(a, &group, out);
+        }
+    }
+
+    #[inline(always)]
+    fn raise_group(&mut self, a: i64, group: &Group, out: &mut Targets) {
+        self.work += group.work;
+        let run = Run { a, first: group.first, len: group.len };
+        let at = &group.at;
+        if at.y[1] - at.y[0] > TALL && at.x[1] - at.x[0] > 1.0 {
+            let beside = Beside::new(&group.rises, self.ball.step_mm, self.ball.slack_mm);
+            raise_run::<V, P>(self.field, self.pairs, run, at, out, Some(&beside));
+        } else {
+            raise_run::<V, P>(self.field, self.pairs, run, at, out, None);
+        }
+    }
+}
+
+#[inline(always)]
+fn count(bits: &[u16; ROWS]) -> u32 {
+    let mut sum = 0;
+    for bits in bits {
+        sum += bits.count_ones();
+    }
+    sum
+}
+
+/// Samples of a row that are taken together.
+struct Group {
+    first: usize,
+    len: usize,
+    rises: Rises,
+    at: Reachable,
+    work: usize,
+}
+
+impl Group {
+    #[inline(always)]
+    fn new(first: usize, rises: Rises, at: Reachable) -> Group {
+        Group { first, len: 1, rises, at, work: Group::work(1, &at) }
+    }
+
+    #[inline(always)]
+    fn work(len: usize, at: &Reachable) -> usize {
+        ((at.y[1] - at.y[0]) as usize + 1) * row_work(len, (at.x[1] - at.x[0]) as usize + 1)
+    }
+
+    #[inline(always)]
+    fn with(&self, other: &Group) -> Group {
+        let at = self.at.hull(&other.at);
+        let len = other.first + other.len - self.first;
+        Group { first: self.first, len, rises: self.rises.with(other.rises), at, work: Group::work(len, &at) }
     }
 }

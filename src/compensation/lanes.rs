@@ -34,8 +34,38 @@ pub(super) trait Vectors {
     fn load(z: &[f32; LANES]) -> Self::Group;
     fn store(group: Self::Group, z: &mut [f32; LANES]);
     fn add(a: Self::Group, b: Self::Group) -> Self::Group;
+    fn subtract(a: Self::Group, b: Self::Group) -> Self::Group;
+    fn multiply(a: Self::Group, b: Self::Group) -> Self::Group;
     /// The greater of each lane; lanes are numbers and never -0.
     fn greater(a: Self::Group, b: Self::Group) -> Self::Group;
+    fn less(a: Self::Group, b: Self::Group) -> Self::Group;
+    fn square_root(a: Self::Group) -> Self::Group;
+    fn floor(a: Self::Group) -> Self::Group;
+    fn ceil(a: Self::Group) -> Self::Group;
+    /// Lanes where a >= b, as bits.
+    fn at_least(a: Self::Group, b: Self::Group) -> u16;
+    /// `a` in the lanes of these bits and `b` in the others.
+    fn choose(bits: u16, a: Self::Group, b: Self::Group) -> Self::Group;
+
+    /// 1 / sqrt(a) for a >= 1, relatively within [`Vectors::INVERSE_ERROR`].
+    fn inverse_root(a: Self::Group) -> Self::Group;
+    const INVERSE_ERROR: f32;
+
+    /// The least of all lanes.
+    #[inline(always)]
+    fn least(a: Self::Group) -> f32 {
+        let mut lanes = [0.0; LANES];
+        Self::store(a, &mut lanes);
+        lanes.iter().fold(f32::MAX, |m, &z| if z < m { z } else { m })
+    }
+
+    /// The greatest of all lanes.
+    #[inline(always)]
+    fn most(a: Self::Group) -> f32 {
+        let mut lanes = [0.0; LANES];
+        Self::store(a, &mut lanes);
+        lanes.iter().fold(f32::MIN, |m, &z| if z > m { z } else { m })
+    }
 }
 
 /// Any processor.
@@ -65,8 +95,55 @@ impl Vectors for Portable {
     }
 
     #[inline(always)]
+    fn subtract(a: Self::Group, b: Self::Group) -> Self::Group {
+        std::array::from_fn(|lane| a[lane] - b[lane])
+    }
+
+    #[inline(always)]
+    fn multiply(a: Self::Group, b: Self::Group) -> Self::Group {
+        std::array::from_fn(|lane| a[lane] * b[lane])
+    }
+
+    #[inline(always)]
     fn greater(a: Self::Group, b: Self::Group) -> Self::Group {
         std::array::from_fn(|lane| if a[lane] > b[lane] { a[lane] } else { b[lane] })
+    }
+
+    #[inline(always)]
+    fn less(a: Self::Group, b: Self::Group) -> Self::Group {
+        std::array::from_fn(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
+    }
+
+    #[inline(always)]
+    fn square_root(a: Self::Group) -> Self::Group {
+        a.map(f32::sqrt)
+    }
+
+    #[inline(always)]
+    fn floor(a: Self::Group) -> Self::Group {
+        a.map(f32::floor)
+    }
+
+    #[inline(always)]
+    fn ceil(a: Self::Group) -> Self::Group {
+        a.map(f32::ceil)
+    }
+
+    #[inline(always)]
+    fn at_least(a: Self::Group, b: Self::Group) -> u16 {
+        (0..LANES).fold(0, |bits, lane| bits | u16::from(a[lane] >= b[lane]) << lane)
+    }
+
+    #[inline(always)]
+    fn choose(bits: u16, a: Self::Group, b: Self::Group) -> Self::Group {
+        std::array::from_fn(|lane| if bits >> lane & 1 == 1 { a[lane] } else { b[lane] })
+    }
+
+    const INVERSE_ERROR: f32 = 1e-6;
+
+    #[inline(always)]
+    fn inverse_root(a: Self::Group) -> Self::Group {
+        a.map(|a| 1.0 / a.sqrt())
     }
 }
 
@@ -105,8 +182,62 @@ impl Vectors for Avx2 {
     }
 
     #[inline(always)]
+    fn subtract(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_sub_ps(a[0], b[0]), x86::_mm256_sub_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn multiply(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_mul_ps(a[0], b[0]), x86::_mm256_mul_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
     fn greater(a: Self::Group, b: Self::Group) -> Self::Group {
         unsafe { [x86::_mm256_max_ps(a[0], b[0]), x86::_mm256_max_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn less(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_min_ps(a[0], b[0]), x86::_mm256_min_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn square_root(a: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_sqrt_ps(a[0]), x86::_mm256_sqrt_ps(a[1])] }
+    }
+
+    #[inline(always)]
+    fn floor(a: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_floor_ps(a[0]), x86::_mm256_floor_ps(a[1])] }
+    }
+
+    #[inline(always)]
+    fn ceil(a: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_ceil_ps(a[0]), x86::_mm256_ceil_ps(a[1])] }
+    }
+
+    #[inline(always)]
+    fn at_least(a: Self::Group, b: Self::Group) -> u16 {
+        let half = |a, b| unsafe { x86::_mm256_movemask_ps(x86::_mm256_cmp_ps::<{ x86::_CMP_GE_OQ }>(a, b)) };
+        half(a[0], b[0]) as u16 | (half(a[1], b[1]) as u16) << 8
+    }
+
+    #[inline(always)]
+    fn choose(bits: u16, a: Self::Group, b: Self::Group) -> Self::Group {
+        let half = |bits: i32, a, b| unsafe {
+            let lanes = x86::_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let chosen = x86::_mm256_and_si256(x86::_mm256_set1_epi32(bits), lanes);
+            let chosen = x86::_mm256_castsi256_ps(x86::_mm256_cmpeq_epi32(chosen, lanes));
+            x86::_mm256_blendv_ps(b, a, chosen)
+        };
+        [half(i32::from(bits), a[0], b[0]), half(i32::from(bits >> 8), a[1], b[1])]
+    }
+
+    const INVERSE_ERROR: f32 = 4e-4;
+
+    #[inline(always)]
+    fn inverse_root(a: Self::Group) -> Self::Group {
+        unsafe { [x86::_mm256_rsqrt_ps(a[0]), x86::_mm256_rsqrt_ps(a[1])] }
     }
 }
 
@@ -139,8 +270,65 @@ impl Vectors for Avx512 {
     }
 
     #[inline(always)]
+    fn subtract(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn multiply(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_mul_ps(a, b) }
+    }
+
+    #[inline(always)]
     fn greater(a: Self::Group, b: Self::Group) -> Self::Group {
         unsafe { x86::_mm512_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn less(a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn square_root(a: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_sqrt_ps(a) }
+    }
+
+    #[inline(always)]
+    fn floor(a: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_roundscale_ps::<{ x86::_MM_FROUND_TO_NEG_INF | x86::_MM_FROUND_NO_EXC }>(a) }
+    }
+
+    #[inline(always)]
+    fn ceil(a: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_roundscale_ps::<{ x86::_MM_FROUND_TO_POS_INF | x86::_MM_FROUND_NO_EXC }>(a) }
+    }
+
+    #[inline(always)]
+    fn at_least(a: Self::Group, b: Self::Group) -> u16 {
+        unsafe { x86::_mm512_cmp_ps_mask::<{ x86::_CMP_GE_OQ }>(a, b) }
+    }
+
+    #[inline(always)]
+    fn choose(bits: u16, a: Self::Group, b: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_mask_blend_ps(bits, b, a) }
+    }
+
+    const INVERSE_ERROR: f32 = 1e-4;
+
+    #[inline(always)]
+    fn inverse_root(a: Self::Group) -> Self::Group {
+        unsafe { x86::_mm512_rsqrt14_ps(a) }
+    }
+
+    #[inline(always)]
+    fn least(a: Self::Group) -> f32 {
+        unsafe { x86::_mm512_reduce_min_ps(a) }
+    }
+
+    #[inline(always)]
+    fn most(a: Self::Group) -> f32 {
+        unsafe { x86::_mm512_reduce_max_ps(a) }
     }
 }
 
@@ -154,15 +342,6 @@ pub(super) fn groups(z: &[f32]) -> &[[f32; LANES]] {
 #[inline(always)]
 pub(super) fn groups_mut(z: &mut [f32]) -> &mut [[f32; LANES]] {
     z.as_chunks_mut().0
-}
-
-/// out = max(out, input + s), over whole groups.
-#[inline(always)]
-pub(super) fn raise<V: Vectors>(out: &mut [f32], input: &[f32], s: f32) {
-    let s = V::splat(s);
-    for (out, input) in groups_mut(out).iter_mut().zip(groups(input)) {
-        V::store(V::greater(V::add(V::load(input), s), V::load(out)), out);
-    }
 }
 
 /// out = max(out, a, b), over whole groups.

@@ -16,19 +16,23 @@
 //! [`Profile::reach`] (twice that for a closing).
 
 mod ball;
+mod blocks;
 mod brute;
 mod chord;
 mod contact;
 mod drop;
 mod field;
+mod interval;
 mod lanes;
 mod pairs;
 mod passes;
 mod profile;
+mod runs;
 mod slopes;
 mod stencil;
 mod stream;
 mod tiles;
+mod unboxed;
 
 pub use drop::lift;
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows};

@@ -24,6 +24,11 @@ pub(super) trait Pairs: Sync {
     /// and below bound its contacts too.
     fn is_lattice(&self) -> bool;
 
+    /// Whether offsets are whole samples.
+    fn is_whole(&self) -> bool {
+        false
+    }
+
     /// A bound on the rounding of two table entries, in mm.
     fn slack_mm(&self) -> f32;
 }
@@ -86,6 +91,10 @@ impl Pairs for OnSamples<'_> {
 
     fn is_lattice(&self) -> bool {
         true
+    }
+
+    fn is_whole(&self) -> bool {
+        self.stencil.fx == 0.0 && self.stencil.fy == 0.0
     }
 
     fn slack_mm(&self) -> f32 {

@@ -1,6 +1,9 @@
 use super::Profile;
 use super::lanes::{LANES, NONE};
 
+/// No data between two arcs' values, so that groups of lanes may run over the ends of an arc.
+const PADDING: usize = 3 * LANES;
+
 /// One row of a stencil: the samples dx in `lo ..= hi` columns from the cutter's axis, of which
 /// `flat_lo ..= flat_hi` lie under its flat bottom. Empty when lo > hi.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +57,7 @@ impl ArcRef<'_> {
         self.values[(self.arc.base as i64 - dx as i64) as usize]
     }
 
-    /// Where s(dx) stands in `values`; larger dx come before it. dx may lie LANES outside.
+    /// Where s(dx) stands in `values`; larger dx come before it. dx may lie 2 LANES outside.
     #[inline(always)]
     pub fn index(&self, dx: i32) -> usize {
         (self.arc.base as i64 - dx as i64) as usize
@@ -67,7 +70,7 @@ impl Stencil {
         let reach = profile.reach() as i64 + 1;
         let plateau_mm = profile.plateau_mm();
         let mut arcs = Vec::new();
-        let mut values = vec![NONE; LANES];
+        let mut values = vec![NONE; PADDING];
         let mut deepest = 0.0f32;
         let mut row = Vec::new();
         for k in -reach..=reach {
@@ -93,7 +96,7 @@ impl Stencil {
             }
             let base = (values.len() as i64 + hi as i64) as usize;
             values.extend(row.iter().rev());
-            values.extend([NONE; LANES]);
+            values.extend([NONE; PADDING]);
             arcs.push(Arc { lo, hi, flat_lo, flat_hi, base });
         }
         Stencil { fx, fy, first: -reach, arcs, values, slack_mm: 4.0 * deepest.abs() * f32::EPSILON }

@@ -15,7 +15,7 @@ const TILE_ROWS: usize = 128;
 const LEAST_CHORD: f64 = 2.0;
 
 /// Radius of a ball, in samples, from which looking for contacts is less work than every sample.
-const LEAST_SEARCH: f64 = 6.0;
+const LEAST_SEARCH: f64 = 4.0;
 
 /// Cutter locations at the samples of `out`, which may reach past the part: the lowest z of the
 /// cutter's lowest point at which it does not cut into `h`. NaN where no data is in reach.
