@@ -7,6 +7,7 @@ mod console;
 mod design;
 mod estimate;
 mod fixtures;
+mod light;
 mod limits;
 mod machines;
 mod mill;
@@ -60,6 +61,7 @@ enum Command {
     Raster(raster::Arguments),
     Compensate(compensate::Arguments),
     Simulate(simulate::Arguments),
+    Light(light::Arguments),
     Machines(machines::Arguments),
     Posts(posts::Arguments),
     Fixtures(fixtures::Arguments),
@@ -102,6 +104,7 @@ pub fn run() -> ExitCode {
         Command::Raster(arguments) => raster::run(arguments, common),
         Command::Compensate(arguments) => compensate::run(arguments, common),
         Command::Simulate(arguments) => simulate::run(arguments, common),
+        Command::Light(arguments) => light::run(arguments, common),
         Command::Machines(arguments) => machines::run(arguments, common),
         Command::Posts(arguments) => posts::run(arguments, common),
         Command::Fixtures(arguments) => fixtures::run(arguments, common),

@@ -1,9 +1,11 @@
-//! Half vector, Fresnel reflectance, solid angles and gain: pure light, no machining.
+//! Half vector, Fresnel reflectance, microfacet lobe, solid angles and gain: pure light, no machining.
 
 mod fresnel;
+mod lobe;
 mod solid_angle;
 
 pub use fresnel::ComplexIndex;
+pub use lobe::Lobe;
 pub use solid_angle::{even_gain, projected_solid_angle};
 
 use glam::DVec3;

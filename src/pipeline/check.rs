@@ -254,7 +254,7 @@ impl Facts<'_> {
         let steepest = self.part.whole.steepest();
         let pose = self.part.pose(self.job, &tile.piece)?;
         let scene = self.part.scene.as_ref()?;
-        Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]) })
+        Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]), far_field: None })
     }
 
     fn block(
@@ -273,7 +273,7 @@ impl Facts<'_> {
         let design = around.crop(near);
         let mut designed = LightTally::default();
         if let Some(sight) = sight {
-            sight.add(&mut designed, &design, window, step_mm);
+            sight.add(&mut designed, &design, window, step_mm, None);
         }
         let mut reached = vec![0u16; near.samples()];
         let mut measured = Vec::new();
@@ -288,7 +288,7 @@ impl Facts<'_> {
             tally.add(window, layers)?;
             let mut light = LightTally::default();
             if let Some(sight) = sight {
-                sight.add(&mut light, &closing, window, step_mm);
+                sight.add(&mut light, &closing, window, step_mm, None);
             }
             measured.push(Measured { tally, light });
         }

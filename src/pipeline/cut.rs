@@ -156,7 +156,9 @@ fn judged(
     let (names, candidates) = candidates(shop, step_mm)?;
     let steepest = part.whole.steepest();
     let sight = match (part.pose(job, &tile.piece), &part.scene) {
-        (Some(pose), Some(scene)) => Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]) }),
+        (Some(pose), Some(scene)) => {
+            Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]), far_field: None })
+        }
         _ => None,
     };
     let case = Case {

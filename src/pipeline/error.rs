@@ -1,5 +1,6 @@
 use std::path::PathBuf;
 
+use crate::grid::Lattice;
 use crate::screen::CellRange;
 
 /// Why a job was refused, or why it ended early.
@@ -56,6 +57,28 @@ pub enum Error {
     OutputFolder { path: PathBuf, source: std::io::Error },
     #[error("limits.on_audience_min is {limit}, and the part is {what}; hint: it is for [part] screen")]
     NoLight { limit: f64, what: &'static str },
+    #[error(
+        "{surface} has {} x {} samples of {} mm, the design {} x {}; hint: a map of the same part at full resolution \
+         ([maps] full = true), or screenmill raster",
+        found.columns, found.rows, found.step_mm, wanted.columns, wanted.rows
+    )]
+    SurfaceOfAnother { surface: PathBuf, wanted: Lattice, found: Lattice },
+    #[error(
+        "{design} holds cells {} .. {}, {} .. {} of {cell_mm} mm, the screen of {scene} has {columns} x {rows} of \
+         {width_mm} mm; hint: the scene that the cells were designed for",
+        core.c0, core.c1, core.r0, core.r1
+    )]
+    DesignOfAnother {
+        design: PathBuf,
+        scene: PathBuf,
+        core: CellRange,
+        cell_mm: f64,
+        columns: i32,
+        rows: i32,
+        width_mm: f64,
+    },
+    #[error("no light of the projector falls on the surface; hint: is this the scene it was designed for?")]
+    NoLightFalls,
     #[error("interrupted; nothing was written")]
     Interrupted,
 }

@@ -168,7 +168,7 @@ impl Case<'_> {
         let near = around.crop(window.grown(1));
         drop(around);
         if let Some(sight) = self.sight {
-            sight.add(&mut block.light_designed, &near, window, lattice.step_mm);
+            sight.add(&mut block.light_designed, &near, window, lattice.step_mm, None);
         }
         for (post, programs) in self.posts.iter().enumerate() {
             let stock = self.blank.heights(self.swept_window(window), lattice.step_mm, 0.0);
@@ -187,7 +187,7 @@ impl Case<'_> {
             let mut light = LightTally::default();
             if let Some(sight) = self.sight {
                 let part = masked(&machined, &near);
-                sight.add(&mut light, &part, window, lattice.step_mm);
+                sight.add(&mut light, &part, window, lattice.step_mm, None);
             }
             block.light_machined.push(light);
             if post == 0 {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::fidelity::light::{LightTally, Pose, Room, View};
+use crate::fidelity::light::{Centres, LightTally, LossMap, Metal, Pose, Room, View};
 use crate::grid::{Heights, Lattice, Window};
 use crate::report::Light;
 use crate::screen::Scene;
@@ -10,26 +10,47 @@ use crate::screen::Scene;
 /// Points across a tile from which the audience is looked at.
 const POINTS: usize = 4;
 
+/// Samples around a block that a ray is followed into, at 10 um.
+const HALO_MM: f64 = 0.16;
+
 /// A tile in its place in front of the audience.
 pub struct Sight<'a> {
     pub scene: &'a Scene,
     pub pose: Pose,
     /// Steepest face of the part, as it hangs.
     pub steepest: f64,
+    pub far_field: Option<&'a Centres>,
 }
 
 impl Sight<'_> {
-    /// Adds the light of a block of heights of the tile's frame.
-    pub fn add(&self, tally: &mut LightTally, heights: &Heights, window: Window, step_mm: f64) {
-        let index = self.scene.reflector.index;
-        let room = Room {
+    /// The room in front of the tile.
+    pub fn room(&self) -> Room<'_> {
+        let reflector = &self.scene.reflector;
+        Room {
             projector_m: self.scene.projector_m,
-            audience: &|point, out| self.scene.audience_hit(point, out),
-            reflectance: &|cosine| index.reflectance(cosine),
+            audience: &self.scene.audience,
+            metal: Metal::new(reflector.index, reflector.roughness, reflector.diffuse),
             steepest: self.steepest,
-        };
-        tally.add(heights, window, step_mm, &self.pose, &room);
+            far_field: self.far_field,
+        }
     }
+
+    /// Adds the light of a block of heights of the tile's frame, and if asked for to a map of the tile.
+    pub fn add(
+        &self,
+        tally: &mut LightTally,
+        heights: &Heights,
+        window: Window,
+        step_mm: f64,
+        map: Option<&mut LossMap>,
+    ) {
+        tally.add(heights, window, step_mm, &self.pose, &self.room(), map);
+    }
+}
+
+/// Samples that the heights of a block should reach further than it on every side.
+pub fn halo(step_mm: f64) -> usize {
+    (HALO_MM / step_mm).ceil().clamp(1.0, 64.0) as usize
 }
 
 /// Points of a tile from which the audience is looked at, in metres of the screen's frame.
@@ -65,5 +86,8 @@ pub fn summary(designed: &LightTally, machined: &LightTally, view: &View) -> Opt
         gain_machined: machined.gain(view),
         uniformity_designed: designed.uniformity(view),
         uniformity_machined: machined.uniformity(view),
+        shadowed_designed: designed.shadowed_fraction(),
+        shadowed_machined: machined.shadowed_fraction(),
+        standard_error: machined.standard_error(),
     })
 }

@@ -18,6 +18,7 @@ mod maps;
 mod pages;
 mod part;
 mod plan;
+mod relit;
 mod report;
 mod rescue;
 mod shop;
@@ -26,6 +27,7 @@ pub use check::{Checked, Reach, check};
 pub use cut::{Milled, mill};
 pub use error::Error;
 pub use estimate::{Estimated, estimate};
+pub use relit::{Lit, Relit, relit};
 
 /// Part of the area that has to lie within `limits.deviation_mm`.
 const WITHIN: f64 = 0.99;

@@ -5,6 +5,7 @@ pub mod design_space;
 pub mod figure;
 pub mod files;
 mod format;
+pub mod light_picture;
 pub mod maps;
 pub mod pages;
 mod palette;

@@ -43,30 +43,53 @@ impl Kind {
         }
     }
 
-    fn title(self) -> &'static str {
+    fn look(self, values: &[f32]) -> Look {
+        let relief = |title| Look {
+            title,
+            bar_title: "height",
+            ends: ["", ""],
+            pixel: "mean height",
+            scale: Scale::robust(values),
+            palette: Palette::heights(),
+            shaded: true,
+        };
         match self {
-            Kind::Design => "Designed surface",
-            Kind::Machined => "Machined surface, read back from the programs",
-            Kind::Deviation => "Deviation of the machined surface from the design",
-            Kind::Cavity => "Cavities that no cutter of the job reaches",
+            Kind::Design => relief("Designed surface"),
+            Kind::Machined => relief("Machined surface, read back from the programs"),
+            Kind::Deviation => Look {
+                title: "Deviation of the machined surface from the design",
+                bar_title: "deviation",
+                ends: ["gouged", "left standing"],
+                pixel: "deviation of the largest size",
+                scale: Scale::about_zero(values),
+                palette: Palette::deviations(),
+                shaded: false,
+            },
+            Kind::Cavity => Look {
+                title: "Cavities that no cutter of the job reaches",
+                bar_title: "depth",
+                ends: ["", "unreached"],
+                pixel: "greatest depth",
+                scale: Scale::from_zero(values, crate::fidelity::CAVITY_THRESHOLD_MM as f32),
+                palette: Palette::cavities(),
+                shaded: false,
+            },
         }
     }
+}
 
-    fn bar_title(self) -> &'static str {
-        match self {
-            Kind::Design | Kind::Machined => "height",
-            Kind::Deviation => "deviation",
-            Kind::Cavity => "depth",
-        }
-    }
-
-    fn ends(self) -> [&'static str; 2] {
-        match self {
-            Kind::Design | Kind::Machined => ["", ""],
-            Kind::Deviation => ["gouged", "left standing"],
-            Kind::Cavity => ["", "unreached"],
-        }
-    }
+/// How a map is titled and coloured.
+pub(super) struct Look {
+    pub title: &'static str,
+    pub bar_title: &'static str,
+    /// Words at the low and the high end of the colour bar.
+    pub ends: [&'static str; 2],
+    /// What a pixel shows.
+    pub pixel: &'static str,
+    pub scale: Scale,
+    pub palette: Palette,
+    /// As a relief, lit from the upper left.
+    pub shaded: bool,
 }
 
 /// Layers small enough for a picture: design and machined are means over each pixel's samples, deviation the one
@@ -141,7 +164,7 @@ impl Preview {
             pitch_mm: self.pitch_mm * self.reducer.factor() as f64,
             z_mm: &self.layers[kind as usize],
         };
-        Sheet::new(&raster, caption).draw(kind, &raster, caption)
+        Sheet::new(&raster, caption).draw(&kind.look(raster.z_mm), &raster, caption)
     }
 }
 
@@ -166,11 +189,11 @@ pub fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Error> {
     write_whole(path, |writer| writer.write_all(bytes.get_ref()).map_err(failed))
 }
 
-struct Raster<'a> {
-    columns: usize,
-    rows: usize,
-    pitch_mm: f64,
-    z_mm: &'a [f32],
+pub(super) struct Raster<'a> {
+    pub columns: usize,
+    pub rows: usize,
+    pub pitch_mm: f64,
+    pub z_mm: &'a [f32],
 }
 
 impl Raster<'_> {
@@ -237,7 +260,7 @@ fn lit(Rgb(color): Rgb<u8>, shade: f64) -> Rgb<u8> {
 }
 
 /// The paper, its font and where the map lies on it.
-struct Sheet {
+pub(super) struct Sheet {
     image: RgbImage,
     font: FontRef<'static>,
     left: i32,
@@ -248,7 +271,7 @@ struct Sheet {
 }
 
 impl Sheet {
-    fn new(raster: &Raster, caption: &Caption) -> Sheet {
+    pub fn new(raster: &Raster, caption: &Caption) -> Sheet {
         let longest = raster.columns.max(raster.rows).max(1);
         let zoom = (MOST_PIXELS / longest).max(1);
         let (width, height) = ((raster.columns * zoom) as i32, (raster.rows * zoom) as i32);
@@ -267,29 +290,21 @@ impl Sheet {
         }
     }
 
-    fn draw(mut self, kind: Kind, raster: &Raster, caption: &Caption) -> RgbImage {
+    pub fn draw(mut self, look: &Look, raster: &Raster, caption: &Caption) -> RgbImage {
         let tile = if caption.tile.is_empty() { String::new() } else { format!("tile {}", caption.tile) };
-        self.text(INK, 30, 20, 31.0, kind.title());
+        self.text(INK, 30, 20, 31.0, look.title);
         let between = if caption.part.is_empty() || tile.is_empty() { "" } else { "  ·  " };
         self.text(SOFT_INK, 31, 56, 21.0, &format!("{}{between}{tile}", caption.part));
 
-        let (scale, palette) = match kind {
-            Kind::Design | Kind::Machined => (Scale::robust(raster.z_mm), Palette::heights()),
-            Kind::Deviation => (Scale::about_zero(raster.z_mm), Palette::deviations()),
-            Kind::Cavity => {
-                let threshold_mm = crate::fidelity::CAVITY_THRESHOLD_MM as f32;
-                (Scale::from_zero(raster.z_mm, threshold_mm), Palette::cavities())
-            }
-        };
-        let relief = matches!(kind, Kind::Design | Kind::Machined).then(|| Relief::of(raster));
-        self.map(raster, &scale, &palette, relief.as_ref());
+        let relief = look.shaded.then(|| Relief::of(raster));
+        self.map(raster, &look.scale, &look.palette, relief.as_ref());
         self.axes(caption.origin_mm);
-        self.bar(kind, &scale, &palette, raster.z_mm);
+        self.bar(look, raster.z_mm);
         self.scale_bar();
 
         let mut y = self.top + self.height.max(260) + 74;
         let mut notes = caption.notes.clone();
-        notes.push(Sheet::made_from(kind, raster.pitch_mm, relief.is_some()));
+        notes.push(Sheet::made_from(look, raster.pitch_mm));
         for note in notes {
             self.text(SOFT_INK, 30, y, 18.0, &note);
             y += LINE_HEIGHT;
@@ -297,13 +312,9 @@ impl Sheet {
         self.image
     }
 
-    fn made_from(kind: Kind, pitch_mm: f64, shaded: bool) -> String {
-        let what = match kind {
-            Kind::Design | Kind::Machined => "mean height",
-            Kind::Deviation => "deviation of the largest size",
-            Kind::Cavity => "greatest depth",
-        };
-        let colors = if shaded {
+    fn made_from(look: &Look, pitch_mm: f64) -> String {
+        let what = look.pixel;
+        let colors = if look.shaded {
             "relief shaded from the upper left, stretched"
         } else {
             "colours go by the square root, so that small figures show"
@@ -370,7 +381,8 @@ impl Sheet {
         self.text(INK, right - length - 12 - text_width as i32, y - 8, 19.0, &label);
     }
 
-    fn bar(&mut self, kind: Kind, scale: &Scale, palette: &Palette, values: &[f32]) {
+    fn bar(&mut self, look: &Look, values: &[f32]) {
+        let Look { scale, palette, .. } = look;
         let (left, width) = (self.left + self.width + 34, 26);
         let (top, height) = (self.top + 46, (self.height - 92).clamp(120, 620));
         for y in 0..height {
@@ -380,8 +392,8 @@ impl Sheet {
         }
         self.frame(left - 1, top - 1, width + 2, height + 2);
         let (unit, per_mm) = scale.unit();
-        self.text(INK, left, self.top - 4, 20.0, &format!("{} in {unit}", kind.bar_title()));
-        let [low, high] = kind.ends();
+        self.text(INK, left, self.top - 4, 20.0, &format!("{} in {unit}", look.bar_title));
+        let [low, high] = look.ends;
         self.text(SOFT_INK, left, self.top + 19, 17.0, high);
         self.text(SOFT_INK, left, top + height + 5, 17.0, low);
         for (value_mm, label) in scale.ticks((height / 75).max(2) as usize) {

@@ -206,6 +206,12 @@ pub struct Light {
     pub gain_machined: Option<f64>,
     pub uniformity_designed: Option<f64>,
     pub uniformity_machined: Option<f64>,
+    /// Part of the samples that the projector does not reach.
+    pub shadowed_designed: Option<f64>,
+    pub shadowed_machined: Option<f64>,
+    /// Of the share on the audience, where a rough metal's directions are drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_error: Option<f64>,
 }
 
 /// Machine time in seconds.

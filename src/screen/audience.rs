@@ -74,6 +74,26 @@ impl Polyhedron {
         &self.half_spaces
     }
 
+    /// Its edges: two ends, and the places in [`Polyhedron::half_spaces`] of the two faces that meet there.
+    pub fn edges(&self) -> Vec<([DVec3; 2], [usize; 2])> {
+        let size = self.vertices_m.iter().map(|&v| (v - self.vertices_m[0]).length()).fold(0.0, f64::max);
+        let on = |h: &HalfSpace, v: DVec3| (h.normal.dot(v) - h.offset_m).abs() <= 1e-7 * size;
+        let mut edges = Vec::new();
+        for (i, first) in self.half_spaces.iter().enumerate() {
+            for (j, second) in self.half_spaces.iter().enumerate().skip(i + 1) {
+                let along = first.normal.cross(second.normal);
+                let shared = || self.vertices_m.iter().copied().filter(|&v| on(first, v) && on(second, v));
+                let by_place = |p: &DVec3, q: &DVec3| along.dot(*p).total_cmp(&along.dot(*q));
+                if let (Some(a), Some(b)) = (shared().min_by(by_place), shared().max_by(by_place))
+                    && (b - a).length() > 1e-7 * size
+                {
+                    edges.push(([a, b], [i, j]));
+                }
+            }
+        }
+        edges
+    }
+
     /// Whether the point is inside or on the border.
     pub fn contains(&self, point_m: DVec3) -> bool {
         self.half_spaces.iter().all(|h| h.normal.dot(point_m) <= h.offset_m)
@@ -93,7 +113,7 @@ impl Polyhedron {
 
 /// Keeps of the ray's stretch `from ..= to` what lies within one half-space; false if nothing does.
 #[inline]
-fn narrow(room_m: f64, speed: f64, from: &mut f64, to: &mut f64) -> bool {
+pub(super) fn narrow(room_m: f64, speed: f64, from: &mut f64, to: &mut f64) -> bool {
     if speed > 0.0 {
         *to = to.min(room_m / speed);
     } else if speed < 0.0 {
@@ -184,6 +204,7 @@ mod tests {
         corners.push(DVec3::new(1.0, 0.3, 3.0));
         let hull = Polyhedron::hull("box", &corners).expect("a solid");
         assert_eq!(hull.half_spaces().len(), 6);
+        assert_eq!(hull.edges().len(), 12);
         assert!(hull.contains(DVec3::new(0.9, -0.9, 2.1)));
         assert!(!hull.contains(DVec3::new(1.01, 0.0, 3.0)));
     }

@@ -17,6 +17,7 @@ mod opening;
 mod power;
 mod scene;
 mod sight;
+mod silhouette;
 mod solid;
 
 pub use audience::{HalfSpace, Polyhedron, View};
@@ -31,4 +32,5 @@ pub use make::design;
 pub use microgeometry::{NotConverged, Solution, Workspace, solve};
 pub use opening::Opening;
 pub use scene::{AreaRule, ElevationMethod, Microgeometry, Reflector, Scene};
+pub use silhouette::Silhouette;
 pub use solid::SolidError;

@@ -67,8 +67,10 @@ pub enum ElevationMethod {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflector {
     pub index: ComplexIndex,
-    /// Width of the microfacet lobe; None is a mirror.
+    /// Width of the microfacet lobe (GGX alpha); None is a mirror.
     pub roughness: Option<f64>,
+    /// Part of the reflected light that leaves as from a matte surface.
+    pub diffuse: f64,
 }
 
 #[derive(Deserialize)]
@@ -127,6 +129,7 @@ struct ReflectorTable {
     n: Option<f64>,
     k: Option<f64>,
     roughness: Option<f64>,
+    diffuse: Option<f64>,
 }
 
 impl Scene {
@@ -261,7 +264,8 @@ fn reflector(source: &Source, table: &ReflectorTable) -> Result<Reflector, Error
         Some(value) => Some(source.within("reflector.roughness", value, 0.0, 1.0)?),
         None => None,
     };
-    Ok(Reflector { index, roughness })
+    let diffuse = source.within("reflector.diffuse", table.diffuse.unwrap_or(0.0), 0.0, 1.0)?;
+    Ok(Reflector { index, roughness, diffuse })
 }
 
 fn audience(source: &Source, tables: &[AudienceTable], size_m: [f64; 2]) -> Result<Vec<Polyhedron>, Error> {

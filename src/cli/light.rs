@@ -1,0 +1,175 @@
+//! `screenmill light`: where the light of a surface goes, against the design it was made from.
+
+use std::path::PathBuf;
+
+use screenmill::pipeline::{self, Lit, Relit};
+use screenmill::report::light_picture::{self, Hemisphere};
+use screenmill::report::picture::{Caption, write_png};
+use screenmill::report::{self, Light, write_json};
+use serde_json::{Value, json};
+
+use super::console::Console;
+use super::staging::Staging;
+use super::{Common, Outcome, Refusal};
+
+/// Follows the projector's light from a surface to the audience, against the design
+#[derive(clap::Args, Clone, Debug)]
+pub struct Arguments {
+    /// Designed cells (.npz) of screenmill design
+    design: PathBuf,
+    /// The surface: heights of the same part (.tif, .npy, .png), e.g. a machined map
+    #[arg(long, value_name = "H.tif")]
+    surface: PathBuf,
+    /// The scene that the cells were designed for
+    #[arg(long, value_name = "SCREEN.toml")]
+    screen: PathBuf,
+    /// Folder for report.json and maps
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Take light to arrive at, and leave from, each cell's centre: directions alone count
+    #[arg(long)]
+    far_field: bool,
+    /// Pitch of a height file that carries none
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pixel_mm: Option<f64>,
+}
+
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
+    let console = Console::new(common.quiet, common.verbose);
+    let case = Relit {
+        design: arguments.design.clone(),
+        surface: arguments.surface.clone(),
+        pixel_mm: arguments.pixel_mm,
+        scene: arguments.screen.clone(),
+        far_field: arguments.far_field,
+    };
+    let lit = pipeline::relit(&case, &console)?;
+    console.times();
+    let staging = Staging::beside(&arguments.out)?;
+    draw(&lit, arguments, &staging.path().join("maps"))?;
+    let report = written(&lit, arguments);
+    write_json(&staging.path().join("report.json"), &report)?;
+    staging.publish(&["report.json", "maps"])?;
+    if common.json {
+        println!("{report}");
+    } else {
+        print(&lit);
+    }
+    Ok(Outcome::Within)
+}
+
+fn written(lit: &Lit, arguments: &Arguments) -> Value {
+    let lattice = &lit.lattice;
+    let planes = &lit.by_planes;
+    json!({
+        "schema": report::schema::SCHEMA, "screenmill": env!("CARGO_PKG_VERSION"),
+        "part": {
+            "width_mm": lattice.width_mm, "height_mm": lattice.height_mm, "columns": lattice.columns,
+            "rows": lattice.rows, "step_mm": lattice.step_mm,
+        },
+        "far_field": arguments.far_field,
+        "light": lit.light,
+        "design_by_planes": {
+            "on_audience": planes.on_audience, "leak": planes.leak, "absorbed": planes.absorbed,
+        },
+        "maps": { "lost": "maps/light-lost.png", "room": "maps/light-room.png" },
+        "notes": lit.notes,
+    })
+}
+
+fn draw(lit: &Lit, arguments: &Arguments, maps: &std::path::Path) -> Result<(), Refusal> {
+    std::fs::create_dir_all(maps)
+        .map_err(|source| pipeline::Error::OutputFolder { path: maps.into(), source })?;
+    let part = arguments.surface.display().to_string();
+    let light = &lit.light;
+    let notes = vec![
+        format!(
+            "on the audience {:.2} % of what falls (the design {:.2} %), beside it {:.2} % ({:.2} %)",
+            100.0 * light.on_audience_machined,
+            100.0 * light.on_audience_designed,
+            100.0 * light.leak_machined,
+            100.0 * light.leak_designed
+        ),
+        format!(
+            "normals by central differences every {} um; {}",
+            1e3 * lit.lattice.step_mm,
+            if arguments.far_field {
+                "far field from each cell's centre"
+            } else {
+                "true places on the screen"
+            }
+        ),
+    ];
+    let caption = Caption { part, notes, ..Caption::default() };
+    let [design, cut] = &lit.maps;
+    let pixels = (0..cut.rows).flat_map(|row| (0..cut.columns).map(move |column| (column, row)));
+    let lost: Vec<f32> = pixels
+        .map(|(column, row)| (design.share(column, row) - cut.share(column, row)).max(0.0) as f32)
+        .collect();
+    let pitch_mm = lit.lattice.step_mm * cut.factor as f64;
+    let picture = light_picture::loss(cut.columns, cut.rows, pitch_mm, &lost, &caption);
+    write_png(&maps.join("light-lost.png"), &picture)?;
+    let [before, after] = lit.tallies.each_ref().map(|tally| tally.room_gain());
+    let bins = screenmill::fidelity::light::ROOM_BINS;
+    let hemispheres = [
+        Hemisphere { title: "design", gain: &before, bins },
+        Hemisphere { title: "as cut", gain: &after, bins },
+    ];
+    let outlines: Vec<[[f64; 3]; 2]> = lit
+        .scene
+        .audience
+        .iter()
+        .flat_map(|polyhedron| polyhedron.edges())
+        .map(|(ends, _)| ends.map(|end| (end - lit.middle_m).to_array()))
+        .collect();
+    write_png(&maps.join("light-room.png"), &light_picture::room(&hemispheres, &outlines, &caption))?;
+    Ok(())
+}
+
+fn print(lit: &Lit) {
+    let Light {
+        on_audience_designed,
+        on_audience_machined,
+        leak_designed,
+        leak_machined,
+        absorbed_designed,
+        absorbed_machined,
+        unresolved_designed,
+        unresolved_machined,
+        gain_designed,
+        gain_machined,
+        uniformity_designed,
+        uniformity_machined,
+        ..
+    } = lit.light;
+    println!("{:<22} {:>10} {:>10}", "of the incident light", "design", "as cut");
+    for (name, before, after) in [
+        ("on the audience", on_audience_designed, on_audience_machined),
+        ("beside it", leak_designed, leak_machined),
+        ("absorbed", absorbed_designed, absorbed_machined),
+        ("not followed", unresolved_designed, unresolved_machined),
+    ] {
+        println!("{name:<22} {:>8.3} % {:>8.3} %", 100.0 * before, 100.0 * after);
+    }
+    for (name, before, after) in
+        [("gain", gain_designed, gain_machined), ("uniformity", uniformity_designed, uniformity_machined)]
+    {
+        if let (Some(before), Some(after)) = (before, after) {
+            println!("{name:<22} {before:>10.3} {after:>10.3}");
+        }
+    }
+    if let Some(error) = lit.light.standard_error {
+        println!(
+            "directions are drawn from the metal's lobe: standard error of the share at most {:.4} %",
+            100.0 * error
+        );
+    }
+    let planes = &lit.by_planes;
+    println!(
+        "the design by its planes, mirrors: {:.3} % of the reflected light on the audience",
+        100.0 * planes.on_audience / (planes.on_audience + planes.leak)
+    );
+    for note in &lit.notes {
+        println!("note: {note}");
+    }
+}

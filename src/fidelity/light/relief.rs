@@ -1,0 +1,286 @@
+//! Which rays from a heightfield meet it again: a horizon that proves for most places that none does, and a
+//! march along the samples for the rest.
+
+use glam::DVec3;
+
+use crate::grid::{Heights, Window};
+
+/// Samples along a side of a patch that shares its horizon.
+const PATCH: usize = 16;
+
+/// Patches from a patch to the rings that are looked at, each ring up to the next.
+const RINGS: [usize; 13] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128];
+
+/// A march passes over what stands less than this over the ray, in mm: rounding of the samples.
+const OVER_MM: f64 = 1e-6;
+
+/// Heights and their horizons; the frame is the heights' own.
+pub struct Relief<'a> {
+    heights: &'a Heights,
+    step_mm: f64,
+    /// Steepest face of the whole surface, for what lies past the window.
+    steepest: f64,
+    across: usize,
+    patches: Vec<Patch>,
+}
+
+#[derive(Clone, Copy)]
+struct Patch {
+    /// Rays that climb faster than this meet nothing.
+    clear: f64,
+    /// Steepest climb between neighbouring samples here and one patch around.
+    slope: f64,
+    /// Highest z within each ring.
+    highest: [f32; RINGS.len()],
+}
+
+/// Where a ray ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum End {
+    /// It meets nothing.
+    Clear,
+    /// It meets the surface next to this sample (column and row of the window's frame).
+    At(i64, i64),
+    /// It leaves the window flatter than the steepest face.
+    Unknown,
+}
+
+impl<'a> Relief<'a> {
+    /// Looks over the heights of a window; a ray that leaves it is clear if it climbs faster than `steepest`.
+    pub fn new(heights: &'a Heights, step_mm: f64, steepest: f64) -> Relief<'a> {
+        let Window { columns, rows, .. } = heights.window;
+        let (across, down) = (columns.div_ceil(PATCH), rows.div_ceil(PATCH));
+        let mut low = vec![f32::INFINITY; across * down];
+        let mut high = vec![f32::NEG_INFINITY; across * down];
+        let mut climbs = vec![[0.0f32; 2]; across * down];
+        for row in 0..rows {
+            let line = &heights.z_mm[row * columns..(row + 1) * columns];
+            let above = heights.z_mm.get((row + 1) * columns..(row + 2) * columns).unwrap_or(line);
+            for patch in 0..across {
+                let at = row / PATCH * across + patch;
+                let (start, end) = (patch * PATCH, ((patch + 1) * PATCH).min(columns));
+                let (mut least, mut most, mut dx, mut dy) = (low[at], high[at], 0.0f32, 0.0f32);
+                // min and max leave NaN out.
+                for column in start..end {
+                    let z = line[column];
+                    least = least.min(z);
+                    most = most.max(z);
+                    dy = dy.max((above[column] - z).abs());
+                }
+                for pair in line[start..(end + 1).min(columns)].windows(2) {
+                    dx = dx.max((pair[1] - pair[0]).abs());
+                }
+                (low[at], high[at]) = (least, most);
+                climbs[at] = [climbs[at][0].max(dx), climbs[at][1].max(dy)];
+            }
+        }
+        let climbs: Vec<f32> = climbs.into_iter().map(|[dx, dy]| dx.hypot(dy)).collect();
+        let slopes = spread(&climbs, across, down, 1);
+        let size_mm = PATCH as f64 * step_mm;
+        let mut patches: Vec<Patch> = (0..across * down)
+            .map(|at| {
+                let slope = f64::from(slopes[at]) / step_mm;
+                Patch { clear: slope.max(steepest), slope, highest: [f32::NEG_INFINITY; RINGS.len()] }
+            })
+            .collect();
+        let mut within = high;
+        let mut radius = 0;
+        for (ring, &reach) in RINGS.iter().enumerate() {
+            while radius < reach {
+                let by = (reach - radius).min(radius.max(1));
+                within = spread(&within, across, down, by);
+                radius += by;
+            }
+            for (at, patch) in patches.iter_mut().enumerate() {
+                patch.highest[ring] = within[at];
+                if ring > 0 && low[at].is_finite() {
+                    let rise = f64::from(within[at]) - f64::from(low[at]);
+                    patch.clear = patch.clear.max(rise / (RINGS[ring - 1] as f64 * size_mm));
+                }
+            }
+            if radius >= across.max(down) {
+                for patch in &mut patches {
+                    for later in ring + 1..RINGS.len() {
+                        patch.highest[later] = f32::NEG_INFINITY;
+                    }
+                }
+                break;
+            }
+        }
+        Relief { heights, step_mm, steepest, across, patches }
+    }
+
+    fn at(&self, column: i64, row: i64) -> f64 {
+        f64::from(self.heights.z_mm[row as usize * self.heights.window.columns + column as usize])
+    }
+
+    /// Where the ray from a sample in a direction (of any length) ends.
+    #[inline]
+    pub fn end(&self, column: i64, row: i64, direction: DVec3) -> End {
+        let window = self.heights.window;
+        let (c, r) = ((column - window.column) as usize, (row - window.row) as usize);
+        let patch = &self.patches[r / PATCH * self.across + c / PATCH];
+        let flat2 = direction.x * direction.x + direction.y * direction.y;
+        if direction.z > 0.0 && direction.z * direction.z > patch.clear * patch.clear * flat2 {
+            return End::Clear;
+        }
+        self.march(c as i64, r as i64, patch, direction)
+    }
+
+    fn march(&self, column: i64, row: i64, patch: &Patch, direction: DVec3) -> End {
+        let window = self.heights.window;
+        let lateral = direction.x.abs().max(direction.y.abs());
+        if lateral == 0.0 {
+            return if direction.z > 0.0 {
+                End::Clear
+            } else {
+                End::At(column + window.column, row + window.row)
+            };
+        }
+        let climb = direction.z / direction.x.hypot(direction.y);
+        let z0 = self.at(column, row);
+        let size_mm = PATCH as f64 * self.step_mm;
+        let far = (1..RINGS.len())
+            .rev()
+            .find(|&ring| z0 + climb * RINGS[ring - 1] as f64 * size_mm <= f64::from(patch.highest[ring]));
+        let patches = match far {
+            Some(ring) => RINGS[ring] + 1,
+            None if climb > patch.slope => 0,
+            None => RINGS[0] + 1,
+        };
+        // Rays that fall are followed to the window's edge.
+        let most = if climb > 0.0 { (patches * PATCH) as i64 } else { i64::MAX };
+        let along_x = direction.x.abs() >= direction.y.abs();
+        let (major, minor) = if along_x { (direction.x, direction.y) } else { (direction.y, direction.x) };
+        let way = major.signum() as i64;
+        let (drift, rise) = (minor / major.abs(), direction.z / lateral * self.step_mm);
+        let (columns, rows) = (window.columns as i64, window.rows as i64);
+        let (count, width) = if along_x { (columns, rows) } else { (rows, columns) };
+        let (start, across) = if along_x { (column, row as f64) } else { (row, column as f64) };
+        let sample = |major: i64, minor: i64| {
+            if along_x { self.at(major, minor) } else { self.at(minor, major) }
+        };
+        let mut k = 0;
+        while k < most {
+            k += 1;
+            let (at, side) = (start + way * k, across + drift * k as f64);
+            let below = side.floor();
+            let first = below as i64;
+            if !(0..count).contains(&at) || first < 0 || side > (width - 1) as f64 {
+                return if climb > self.steepest { End::Clear } else { End::Unknown };
+            }
+            let part = side - below;
+            let low = sample(at, first);
+            let surface = if part > 0.0 { low + part * (sample(at, first + 1) - low) } else { low };
+            // False for no data, which nothing meets.
+            if surface > z0 + rise * k as f64 + OVER_MM {
+                let nearest = if part < 0.5 { first } else { first + 1 };
+                let (column, row) = if along_x { (at, nearest) } else { (nearest, at) };
+                return End::At(column + window.column, row + window.row);
+            }
+        }
+        // Over all that the window shows; past it the steepest face could stand.
+        if climb > self.steepest { End::Clear } else { End::Unknown }
+    }
+}
+
+/// Largest value within `by` places along both axes.
+fn spread(values: &[f32], across: usize, down: usize, by: usize) -> Vec<f32> {
+    let mut rows = vec![f32::NEG_INFINITY; values.len()];
+    for r in 0..down {
+        for c in 0..across {
+            let near = &values[r * across + c.saturating_sub(by)..=r * across + (c + by).min(across - 1)];
+            rows[r * across + c] = near.iter().fold(f32::NEG_INFINITY, |most, v| most.max(*v));
+        }
+    }
+    let mut out = vec![f32::NEG_INFINITY; values.len()];
+    for r in 0..down {
+        for near in r.saturating_sub(by)..=(r + by).min(down - 1) {
+            for c in 0..across {
+                out[r * across + c] = out[r * across + c].max(rows[near * across + c]);
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use parry3d::math::Vector;
+    use parry3d::query::{Ray, RayCast};
+    use parry3d::shape::HeightField;
+    use parry3d::utils::Array2;
+
+    use super::*;
+
+    const STEP_MM: f64 = 0.01;
+
+    fn steps(columns: usize, rows: usize) -> Heights {
+        let window = Window { column: -3, row: 5, columns, rows };
+        let mut heights = Heights::empty(window);
+        for (index, z) in heights.z_mm.iter_mut().enumerate() {
+            let (c, r) = ((index % columns) as f64, (index / columns) as f64);
+            let cell = ((c / 23.0).floor() + 2.0 * (r / 17.0).floor()).rem_euclid(3.0);
+            *z = (0.03 * cell + 0.02 * (0.09 * c).sin() * (0.07 * r).cos()) as f32;
+        }
+        heights
+    }
+
+    /// The march against ray casting in the triangles between the samples. The two surfaces differ inside a square of
+    /// four samples, so a few rays that graze an edge may be told differently.
+    #[test]
+    fn it_meets_what_a_ray_cast_meets() {
+        let (columns, rows) = (90, 70);
+        let heights = steps(columns, rows);
+        let relief = Relief::new(&heights, STEP_MM, 0.1);
+        // parry's field lies in x and z with y up.
+        let field = Array2::new(rows, columns, {
+            let by_column = (0..columns).flat_map(|c| (0..rows).map(move |r| (r, c)));
+            by_column.map(|(r, c)| heights.z_mm[r * columns + c] * 100.0).collect()
+        });
+        let size = Vector::new((columns - 1) as f32, 1.0, (rows - 1) as f32);
+        let field = HeightField::new(field, size);
+        let (mut met, mut clear, mut differ) = (0, 0, 0);
+        for k in 0..6000u32 {
+            let turn = |by: f64| (f64::from(k) * by).fract();
+            let c = 20 + (turn(0.7548) * (columns - 40) as f64) as usize;
+            let r = 20 + (turn(0.5698) * (rows - 40) as f64) as usize;
+            let angle = turn(0.3247) * std::f64::consts::TAU;
+            let direction = DVec3::new(angle.cos(), angle.sin(), 0.3 + 2.5 * turn(0.618));
+            let end = relief.end(c as i64 - 3, r as i64 + 5, direction);
+            let lift = 1e-3;
+            let origin = Vector::new(
+                c as f32 - 0.5 * (columns - 1) as f32,
+                heights.z_mm[r * columns + c] * 100.0 + lift,
+                r as f32 - 0.5 * (rows - 1) as f32,
+            );
+            let ray =
+                Ray::new(origin, Vector::new(direction.x as f32, direction.z as f32, direction.y as f32));
+            let hit = field.cast_local_ray(&ray, 1e4, false).is_some();
+            match end {
+                End::At(..) if hit => met += 1,
+                End::Clear if !hit => clear += 1,
+                End::Unknown => {}
+                _ => differ += 1,
+            }
+        }
+        assert!(met > 300 && clear > 2000, "{met} met, {clear} clear, {differ} differ");
+        assert!(differ < 60, "{met} met, {clear} clear, {differ} differ");
+    }
+
+    #[test]
+    fn a_wall_throws_the_shadow_of_its_height() {
+        let window = Window { column: 0, row: 0, columns: 400, rows: 3 };
+        let mut heights = Heights::empty(window);
+        for (index, z) in heights.z_mm.iter_mut().enumerate() {
+            *z = if index % 400 < 300 { 0.0 } else { 0.5 };
+        }
+        let relief = Relief::new(&heights, STEP_MM, 0.0);
+        // At a slope of 1 the shadow is 50 samples long.
+        for column in 0..300 {
+            let end = relief.end(column, 1, DVec3::new(1.0, 0.0, 1.0));
+            assert_eq!(matches!(end, End::At(..)), column > 250, "{column}: {end:?}");
+            assert_eq!(relief.end(column, 1, DVec3::new(-1.0, 0.0, 1.0)), End::Clear);
+        }
+    }
+}

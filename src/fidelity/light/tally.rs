@@ -1,0 +1,458 @@
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::metal::draw;
+use super::view::{BINS, bin_of};
+use super::{End, Pose, Relief, Room, Stage, View};
+use crate::grid::{Heights, Window};
+
+/// Bounces that are followed; light that has not left by then is unresolved.
+const BOUNCES: u64 = 6;
+
+/// Bins across the hemisphere of all outgoing directions, by (o_x, o_y) from -1 to 1.
+pub const ROOM_BINS: usize = 200;
+
+/// Bins of the room that make one bin of the uniformity.
+const FINE: usize = ROOM_BINS / BINS;
+
+/// Bins that the audience fills less than this are left out of the uniformity.
+const FILLED: f64 = 0.25;
+
+/// Rows per task; a constant, so that it is no part of how sums come about.
+const BAND_ROWS: usize = 64;
+
+/// Shares of the incident light; they sum to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shares {
+    pub on_audience: f64,
+    pub leak: f64,
+    pub absorbed: f64,
+    /// Not followed to its end: after six bounces, into another microfacet, or flat past what is known of the surface.
+    pub unresolved: f64,
+}
+
+/// Sums of light over the samples seen so far.
+#[derive(Clone, Debug)]
+pub struct LightTally {
+    samples: u64,
+    /// Samples that the projector does not reach.
+    shadowed: u64,
+    drawn: bool,
+    incident: f64,
+    on_audience: f64,
+    leak: f64,
+    absorbed: f64,
+    unresolved: f64,
+    bins: Vec<f64>,
+    room: Vec<f64>,
+}
+
+impl Default for LightTally {
+    fn default() -> LightTally {
+        LightTally {
+            samples: 0,
+            shadowed: 0,
+            drawn: false,
+            incident: 0.0,
+            on_audience: 0.0,
+            leak: 0.0,
+            absorbed: 0.0,
+            unresolved: 0.0,
+            bins: vec![0.0; BINS * BINS],
+            room: vec![0.0; ROOM_BINS * ROOM_BINS],
+        }
+    }
+}
+
+/// Incident light and light on the audience over squares of samples, for a picture of where it is lost.
+#[derive(Clone, Debug)]
+pub struct LossMap {
+    /// Samples along a side of a pixel.
+    pub factor: usize,
+    pub columns: usize,
+    pub rows: usize,
+    incident: Vec<f64>,
+    on_audience: Vec<f64>,
+}
+
+impl LossMap {
+    /// Nothing yet, for this many samples; no side longer than `most` pixels.
+    pub fn new(columns: usize, rows: usize, most: usize) -> LossMap {
+        let factor = columns.max(rows).div_ceil(most).max(1);
+        let (columns, rows) = (columns.div_ceil(factor), rows.div_ceil(factor));
+        let zero = vec![0.0; columns * rows];
+        LossMap { factor, columns, rows, incident: zero.clone(), on_audience: zero }
+    }
+
+    /// Share of the incident light on the audience in a pixel; NaN where none fell. Row 0 is the lowest.
+    pub fn share(&self, column: usize, row: usize) -> f64 {
+        let at = row * self.columns + column;
+        self.on_audience[at] / self.incident[at]
+    }
+
+    /// Adds a row's light by pixels, from the pixel of column `first` on.
+    fn add(&mut self, row: i64, first: i64, light: &[[f64; 2]]) {
+        let start = row as usize / self.factor * self.columns + first as usize / self.factor;
+        for (offset, [incident, on_audience]) in light.iter().enumerate() {
+            self.incident[start + offset] += incident;
+            self.on_audience[start + offset] += on_audience;
+        }
+    }
+}
+
+/// One band's sums, and its rows' light by pixels of the map if one is wanted.
+type Band = (LightTally, Vec<Vec<[f64; 2]>>);
+
+impl LightTally {
+    /// Adds the samples of `window`; `heights` covers it with a halo of one sample or more where there is data. Rays
+    /// are followed as far as `heights` reaches.
+    pub fn add(
+        &mut self,
+        heights: &Heights,
+        window: Window,
+        step_mm: f64,
+        pose: &Pose,
+        room: &Room,
+        mut map: Option<&mut LossMap>,
+    ) {
+        let relief = Relief::new(heights, step_mm, room.steepest);
+        let (columns, rows) = (window.columns as f64 * step_mm, window.rows as f64 * step_mm);
+        let finite = heights.z_mm.iter().copied().filter(|z| z.is_finite());
+        let (low, high) =
+            finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+        if low > high {
+            return;
+        }
+        let corner = DVec3::new(window.column as f64, window.row as f64, 0.0) * step_mm;
+        let middle_mm = corner + 0.5 * DVec3::new(columns, rows, f64::from(low) + f64::from(high));
+        let within_mm = columns.hypot(rows) + f64::from(high) - f64::from(low);
+        let stage = Stage::new(room, pose, middle_mm, within_mm);
+        let ground = Ground { heights, step_mm };
+        let starts: Vec<i64> = (window.row..window.row_end()).step_by(BAND_ROWS).collect();
+        let factor = map.as_ref().map(|map| map.factor as i64);
+        let bands: Vec<Band> = starts
+            .into_par_iter()
+            .map(|first| {
+                let mut tally = LightTally { drawn: !room.metal.is_mirror(), ..LightTally::default() };
+                let mut light = Vec::new();
+                for row in first..(first + BAND_ROWS as i64).min(window.row_end()) {
+                    let Some(factor) = factor else {
+                        for column in window.column..window.column_end() {
+                            tally.sample(&ground, &relief, &stage, column, row);
+                        }
+                        continue;
+                    };
+                    let pixel = |column: i64| (column / factor - window.column / factor) as usize;
+                    let mut line = vec![[0.0; 2]; pixel(window.column_end() - 1) + 1];
+                    for column in window.column..window.column_end() {
+                        let [taken, arrived] = tally.sample(&ground, &relief, &stage, column, row);
+                        let [incident, on_audience] = &mut line[pixel(column)];
+                        *incident += taken;
+                        *on_audience += arrived;
+                    }
+                    light.push(line);
+                }
+                (tally, light)
+            })
+            .collect();
+        let mut row = window.row;
+        for (tally, light) in &bands {
+            self.merge(tally);
+            for line in light {
+                if let Some(map) = map.as_deref_mut() {
+                    map.add(row, window.column, line);
+                }
+                row += 1;
+            }
+        }
+    }
+
+    /// Adds another tally; the caller keeps the order of blocks so that sums are the same each run.
+    pub fn merge(&mut self, other: &LightTally) {
+        self.samples += other.samples;
+        self.shadowed += other.shadowed;
+        self.drawn |= other.drawn;
+        self.incident += other.incident;
+        self.on_audience += other.on_audience;
+        self.leak += other.leak;
+        self.absorbed += other.absorbed;
+        self.unresolved += other.unresolved;
+        for (sum, bin) in self.bins.iter_mut().zip(&other.bins) {
+            *sum += bin;
+        }
+        for (sum, bin) in self.room.iter_mut().zip(&other.room) {
+            *sum += bin;
+        }
+    }
+
+    /// Follows the light of one sample; gives what fell on it and what of that reached the audience.
+    #[inline]
+    fn sample(&mut self, ground: &Ground, relief: &Relief, stage: &Stage, column: i64, row: i64) -> [f64; 2] {
+        let Some((p_mm, normal)) = ground.sample(column, row) else { return [0.0; 2] };
+        let mut place_m = stage.place_m(p_mm);
+        let mut i = (stage.projector_m - place_m).normalize();
+        let taken = i.dot(normal);
+        self.samples += 1;
+        if taken <= 0.0 || matches!(relief.end(column, row, i), End::At(..)) {
+            self.shadowed += 1;
+            return [0.0; 2];
+        }
+        self.incident += taken;
+        let (mut left, mut n) = (taken, normal.normalize());
+        let (mut column, mut row) = (column, row);
+        for bounce in 0..BOUNCES {
+            let way = stage.metal.scatter(i, n, i.dot(n), || draw(column, row, bounce));
+            self.absorbed += left * way.absorbed;
+            self.unresolved += left * way.masked;
+            left *= way.goes_on;
+            match relief.end(column, row, way.out) {
+                End::Clear => {
+                    let out = stage.rotation * way.out;
+                    let (x, y) = (bin_of(out.x, ROOM_BINS), bin_of(out.y, ROOM_BINS));
+                    self.room[x + ROOM_BINS * y] += left;
+                    if stage.silhouette.met(place_m, way.out) {
+                        self.on_audience += left;
+                        self.bins[x / FINE + BINS * (y / FINE)] += left;
+                        return [taken, left];
+                    }
+                    self.leak += left;
+                    return [taken, 0.0];
+                }
+                End::Unknown => break,
+                End::At(next_column, next_row) => {
+                    let Some((p_mm, normal)) = ground.sample(next_column, next_row) else { break };
+                    (i, n) = (-way.out, normal.normalize());
+                    if i.dot(n) <= 0.0 {
+                        break;
+                    }
+                    (column, row) = (next_column, next_row);
+                    place_m = stage.place_m(p_mm);
+                }
+            }
+        }
+        self.unresolved += left;
+        [taken, 0.0]
+    }
+
+    /// Shares of the incident light, or None before any light fell.
+    pub fn shares(&self) -> Option<Shares> {
+        (self.incident > 0.0).then(|| Shares {
+            on_audience: self.on_audience / self.incident,
+            leak: self.leak / self.incident,
+            absorbed: self.absorbed / self.incident,
+            unresolved: self.unresolved / self.incident,
+        })
+    }
+
+    /// Standard error of the share on the audience where directions are drawn: that of as many independent draws as
+    /// there are samples, which is more than it is.
+    pub fn standard_error(&self) -> Option<f64> {
+        let share = self.shares()?.on_audience;
+        self.drawn.then(|| (share * (1.0 - share) / self.samples as f64).sqrt())
+    }
+
+    /// Part of the samples that the projector does not reach.
+    pub fn shadowed_fraction(&self) -> Option<f64> {
+        (self.samples > 0).then(|| self.shadowed as f64 / self.samples as f64)
+    }
+
+    /// Gain in each bin of direction, [`ROOM_BINS`] squared by (o_x, o_y), lowest y first.
+    pub fn room_gain(&self) -> Vec<f64> {
+        let bin_sr = (2.0 / ROOM_BINS as f64).powi(2);
+        let per_sr = std::f64::consts::PI / (bin_sr * self.incident);
+        self.room.iter().map(|flux| flux * per_sr).collect()
+    }
+
+    /// Mean luminance over the audience, far field, relative to a Lambertian of reflectance 1:
+    /// pi * share / L, with L of Eq. 9.
+    pub fn gain(&self, view: &View) -> Option<f64> {
+        let shares = self.shares()?;
+        (view.projected_sr > 0.0).then(|| std::f64::consts::PI * shares.on_audience / view.projected_sr)
+    }
+
+    /// 1 - (standard deviation / mean) of the luminance over the bins of direction that the audience fills.
+    pub fn uniformity(&self, view: &View) -> Option<f64> {
+        let bin_sr = (2.0 / BINS as f64).powi(2);
+        let (mut weight, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for (flux, area) in self.bins.iter().zip(&view.bins_sr) {
+            if *area < FILLED * bin_sr {
+                continue;
+            }
+            let luminance = flux / area;
+            weight += area;
+            sum += area * luminance;
+            squares += area * luminance * luminance;
+        }
+        let mean = sum / weight;
+        (mean > 0.0).then(|| 1.0 - (squares / weight - mean * mean).max(0.0).sqrt() / mean)
+    }
+}
+
+/// Heights as places and normals.
+struct Ground<'a> {
+    heights: &'a Heights,
+    step_mm: f64,
+}
+
+impl Ground<'_> {
+    #[inline]
+    fn at(&self, column: i64, row: i64) -> f64 {
+        let window = &self.heights.window;
+        let (c, r) = (column - window.column, row - window.row);
+        if c >= 0 && (c as usize) < window.columns && r >= 0 && (r as usize) < window.rows {
+            f64::from(self.heights.z_mm[r as usize * window.columns + c as usize])
+        } else {
+            f64::NAN
+        }
+    }
+
+    /// A sample's place in mm and the normal (-z_x, -z_y, 1) there; None without data or neighbours.
+    #[inline]
+    fn sample(&self, column: i64, row: i64) -> Option<(DVec3, DVec3)> {
+        let z = self.at(column, row);
+        if z.is_nan() {
+            return None;
+        }
+        let zx = slope(self.at(column - 1, row), z, self.at(column + 1, row), self.step_mm)?;
+        let zy = slope(self.at(column, row - 1), z, self.at(column, row + 1), self.step_mm)?;
+        let place = DVec3::new((column as f64 + 0.5) * self.step_mm, (row as f64 + 0.5) * self.step_mm, z);
+        Some((place, DVec3::new(-zx, -zy, 1.0)))
+    }
+}
+
+#[inline]
+fn slope(before: f64, here: f64, after: f64, step_mm: f64) -> Option<f64> {
+    match (before.is_nan(), after.is_nan()) {
+        (false, false) => Some((after - before) / (2.0 * step_mm)),
+        (true, false) => Some((after - here) / step_mm),
+        (false, true) => Some((here - before) / step_mm),
+        (true, true) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat3;
+
+    use super::super::Metal;
+    use super::*;
+    use crate::optics::ComplexIndex;
+    use crate::screen::Polyhedron;
+
+    const ALUMINIUM: ComplexIndex = ComplexIndex { n: 1.0, k: 6.4 };
+
+    fn heights(window: Window, z_mm: impl Fn(f64, f64) -> f64) -> Heights {
+        let mut heights = Heights::empty(window);
+        for (index, z) in heights.z_mm.iter_mut().enumerate() {
+            let column = window.column + (index % window.columns) as i64;
+            let row = window.row + (index / window.columns) as i64;
+            *z = z_mm((column as f64 + 0.5) * 0.01, (row as f64 + 0.5) * 0.01) as f32;
+        }
+        heights
+    }
+
+    fn light(heights: &Heights, metal: Metal, audience: &[Polyhedron]) -> LightTally {
+        let window = heights.window;
+        let inner = Window {
+            column: window.column + 1,
+            row: window.row + 1,
+            columns: window.columns - 2,
+            rows: window.rows - 2,
+        };
+        let pose = Pose { origin_m: DVec3::ZERO, rotation: DMat3::IDENTITY };
+        let projector_m = DVec3::new(0.0, 0.0, 1e4);
+        let room = Room { projector_m, audience, metal, steepest: 0.5, far_field: None };
+        let mut tally = LightTally::default();
+        tally.add(heights, inner, 0.01, &pose, &room, None);
+        tally
+    }
+
+    fn body(centre: DVec3, half: f64) -> Polyhedron {
+        let corners: Vec<DVec3> = (0..8)
+            .map(|k| {
+                let side = |bit: i32| if k & bit == 0 { -half } else { half };
+                centre + DVec3::new(side(1), side(2), side(4))
+            })
+            .collect();
+        Polyhedron::hull("body", &corners).expect("a solid")
+    }
+
+    fn sum(shares: Shares) -> f64 {
+        shares.on_audience + shares.leak + shares.absorbed + shares.unresolved
+    }
+
+    #[test]
+    fn a_flat_mirror_sends_everything_one_way() {
+        let window = Window { column: 0, row: 0, columns: 34, rows: 34 };
+        let tilted = heights(window, |x, _| 0.2 * x);
+        let n = DVec3::new(-0.2, 0.0, 1.0).normalize();
+        let out = 2.0 * n.z * n - DVec3::Z;
+        let metal = Metal::new(ALUMINIUM, None, 0.0);
+        let tally = light(&tilted, metal, &[body(3.0 * out, 0.01)]);
+        let shares = tally.shares().expect("light fell");
+        let reflected = ALUMINIUM.reflectance(n.z);
+        assert!((shares.on_audience - reflected).abs() < 1e-6, "{shares:?}");
+        assert!((sum(shares) - 1.0).abs() < 1e-12);
+        assert_eq!(tally.standard_error(), None);
+        let beside = light(&tilted, metal, &[body(3.0 * out + DVec3::new(0.05, 0.0, 0.0), 0.01)]);
+        assert!(beside.shares().expect("light fell").on_audience == 0.0);
+    }
+
+    #[test]
+    fn a_matte_surface_has_gain_one() {
+        let window = Window { column: 0, row: 0, columns: 502, rows: 502 };
+        // A perfect reflector: n = 0.01, k = 100 reflects 0.99999.
+        let metal = Metal::new(ComplexIndex { n: 0.01, k: 100.0 }, None, 1.0);
+        let audience = [body(DVec3::new(0.8, 0.3, 3.0), 0.9)];
+        let tally = light(&heights(window, |_, _| 0.0), metal, &audience);
+        let view = View::from_points(&[DVec3::ZERO], &|p, o| audience[0].hit(p, o));
+        let gain = tally.gain(&view).expect("light fell");
+        assert!((gain - 1.0).abs() < 0.02, "{gain}");
+        let error = tally.standard_error().expect("drawn");
+        assert!(error > 1e-4 && error < 2e-3, "{error}");
+        assert!((sum(tally.shares().expect("light fell")) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn light_is_kept_whatever_it_meets() {
+        let window = Window { column: 0, row: 0, columns: 202, rows: 202 };
+        // Grooves of 45 degrees send light twice round.
+        let grooves = heights(window, |x, _| ((x / 0.4).fract() - 0.5).abs() * 0.4);
+        let audience = [body(DVec3::new(0.0, 0.0, 3.0), 0.2)];
+        for metal in [
+            Metal::new(ALUMINIUM, None, 0.0),
+            Metal::new(ALUMINIUM, Some(0.2), 0.05),
+            Metal::new(ALUMINIUM, Some(0.7), 0.0),
+        ] {
+            let shares = light(&grooves, metal, &audience).shares().expect("light fell");
+            assert!((sum(shares) - 1.0).abs() < 1e-9, "{shares:?}");
+        }
+        let mirror = light(&grooves, Metal::new(ALUMINIUM, None, 0.0), &audience);
+        let shares = mirror.shares().expect("light fell");
+        // Two reflections at 45 degrees bring it straight back, but where a ridge or a bottom lies between samples.
+        let twice = ALUMINIUM.reflectance(0.5f64.sqrt()).powi(2);
+        assert!((shares.on_audience - twice).abs() < 0.12, "{shares:?} {twice}");
+    }
+
+    #[test]
+    fn a_map_holds_what_the_sums_hold() {
+        let window = Window { column: 0, row: 0, columns: 120, rows: 90 };
+        let bumps = heights(window, |x, y| 0.01 * (20.0 * x).sin() * (15.0 * y).cos());
+        let audience = [body(DVec3::new(0.0, 0.0, 3.0), 0.3)];
+        let pose = Pose { origin_m: DVec3::ZERO, rotation: DMat3::IDENTITY };
+        let metal = Metal::new(ALUMINIUM, None, 0.0);
+        let projector_m = DVec3::new(0.0, 0.0, 5.0);
+        let room = Room { projector_m, audience: &audience, metal, steepest: 0.3, far_field: None };
+        let (mut tally, mut map) = (LightTally::default(), LossMap::new(120, 90, 50));
+        for column in [0, 64] {
+            let part = Window { column, columns: if column == 0 { 64 } else { 56 }, ..window };
+            tally.add(&bumps, part, 0.01, &pose, &room, Some(&mut map));
+        }
+        assert_eq!((map.factor, map.columns, map.rows), (3, 40, 30));
+        let total = |values: &[f64]| values.iter().sum::<f64>();
+        assert!((total(&map.incident) - tally.incident).abs() < 1e-9 * tally.incident);
+        assert!((total(&map.on_audience) - tally.on_audience).abs() < 1e-9 * tally.incident);
+        let room: f64 = tally.room.iter().sum();
+        assert!((room - tally.on_audience - tally.leak).abs() < 1e-9 * tally.incident);
+    }
+}
