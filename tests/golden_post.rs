@@ -25,7 +25,7 @@ fn small(unit_mm: f64) -> Toolpath {
         at(Kind::Plunge, 0, 0, -1),
         at(Kind::Cut, 1, 1, 0),
     ];
-    Toolpath { unit_mm, moves, pass_starts: vec![0, 10] }
+    Toolpath { unit_mm, moves, pass_starts: vec![0, 10], tilt: None }
 }
 
 fn written(dialect: &str, machine: &str, library: &str, z_zero: ZZero) -> String {

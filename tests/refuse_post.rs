@@ -77,7 +77,7 @@ fn program(change: &str) -> String {
         }
         _ => panic!("unknown change {change}"),
     }
-    let path = Toolpath { unit_mm, moves, pass_starts: vec![0] };
+    let path = Toolpath { unit_mm, moves, pass_starts: vec![0], tilt: None };
     let stock = StockFacts {
         material: "aluminium".into(),
         width_mm: 10.0,

@@ -112,7 +112,7 @@ fn path(unit_mm: f64, steps: &[(u8, i32, i32, i32)]) -> Toolpath {
             }
         }
     }
-    Toolpath { unit_mm, moves, pass_starts: vec![0] }
+    Toolpath { unit_mm, moves, pass_starts: vec![0], tilt: None }
 }
 
 fn wanted(path: &Toolpath, clearance: i32, feeds: [&str; 4], rapids: bool) -> Vec<Read> {
@@ -183,7 +183,7 @@ fn a_long_program_takes_a_second_at_most_per_million_moves() {
     moves.extend(
         (0..1_000_000).map(|i| Move { kind: Kind::Cut, to: [i * 3, i / 1000 * 500, -(i * 7 % 9973)] }),
     );
-    let path = Toolpath { unit_mm: dialect.unit_mm, moves, pass_starts: vec![0] };
+    let path = Toolpath { unit_mm: dialect.unit_mm, moves, pass_starts: vec![0], tilt: None };
     let start = std::time::Instant::now();
     let text = text_of(&path, tool, &dialect, &machine);
     let elapsed = start.elapsed();

@@ -46,6 +46,8 @@ pub struct Program {
     pub reading: Reading,
     pub extent: Extent,
     pub timing: Timing,
+    /// What rounding does to the mirrors; known of a finish that leaves no stock.
+    pub tilt: Option<toolpath::Tilt>,
 }
 
 /// The programs of a tile in one dialect.
@@ -247,9 +249,11 @@ pub fn programs(
         progress.begin("write", 1);
         let file = program_file(job, shop, &tile.setup.tile.name, dialect, index, tool);
         write(job, shop, tile, dialect, index, &path, &folder.join(&file))?;
+        let tilt = path.tilt;
         drop(path);
         progress.begin("read back", 1);
-        planned.programs.push(read_back(shop, dialect, folder, file, index)?);
+        let program = read_back(shop, dialect, folder, file, index)?;
+        planned.programs.push(Program { tilt, ..program });
     }
     Ok(planned)
 }
@@ -277,7 +281,7 @@ fn read_back(
         .map_err(|source| Error::ReadBack { path: file.clone(), source })?;
     let extent = reading.extent();
     let timing = verify::time(&reading, &(&shop.machine).into());
-    Ok(Program { file, operation, reading, extent, timing })
+    Ok(Program { file, operation, reading, extent, timing, tilt: None })
 }
 
 /// Writes one program; a file that could not be finished keeps no name.

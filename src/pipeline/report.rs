@@ -147,6 +147,7 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
         for (index, program) in result.posts[post].programs.iter().enumerate() {
             let cut = &result.verdict.cuts[post][index];
             bad.extend(of_motions(shop, result, post, index));
+            found.extend(of_rounding(result, program));
             found.extend(of_wear(shop, program, cut).into_iter().map(|f| f.on(&name)));
         }
         if !bad.is_empty() {
@@ -217,6 +218,20 @@ fn of_motions(shop: &Shop, result: &TileResult, post: usize, index: usize) -> Ve
         found.push(finding(Severity::Warning, "air", message).on(name));
     }
     found
+}
+
+/// How far the controller's grid turns the mirrors, as planned: what an operator can know before the cut.
+fn of_rounding(result: &TileResult, program: &Program) -> Option<Finding> {
+    let tilt = program.tilt?;
+    let (rms_deg, worst) = (tilt.rms_deg()?, tilt.worst?);
+    let message = format!(
+        "{}: rounding and simplification turn mirrors along the passes by {rms_deg:.3} degrees rms, at most {:.3} degrees over {:.2} mm",
+        program.file.display(),
+        worst.deg,
+        worst.length_mm
+    );
+    let note = finding(Severity::Note, "rounding-tilt", message).on(&result.tile.setup.tile.name);
+    Some(note.at(&result.in_part(worst.at_mm)))
 }
 
 /// What a program asks of its cutter, and what its reader noticed.

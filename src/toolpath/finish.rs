@@ -6,7 +6,7 @@ use super::envelope::{Cutter, Envelope};
 use super::passes::{contact_radius_mm, tip_radius_mm};
 use super::pen::Pen;
 use super::strip::{Strip, band_length};
-use super::{Axis, Error, GridPoint, Layout, Progress, Site, Toolpath, funnel, link};
+use super::{Axis, Error, GridPoint, Layout, Progress, Site, Tilt, Toolpath, ends, funnel, link};
 use crate::cutter::Shape;
 use crate::tolerance::EXCESS_MM;
 
@@ -114,6 +114,7 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
     let mut pen = Pen::new(site);
     let mut before: Option<(usize, GridPoint)> = None;
     let mut since_retract = 0;
+    let mut tilt = Tilt::default();
     let mut first = 0;
     while first < passes {
         let last = first + band_length(&layout, first, lattice.step_mm, cutter.reach_mm) - 1;
@@ -121,18 +122,20 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
         let low_mm = layout.across_mm(first) - longest_mm;
         let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), cutter.reach_mm)?;
         let envelopes = cutter.envelopes(&strip, &layout, first..last + 1);
-        let band: Vec<Vec<Run>> = (first..last + 1)
+        let planned: Vec<(Vec<Run>, Tilt)> = (first..last + 1)
             .into_par_iter()
             .zip(envelopes)
             .map(|(k, envelope)| {
-                let mut runs = pass(site, params, &layout, &envelope);
+                let (mut runs, tilt) = pass(site, params, &layout, k, stepover_mm, &envelope);
                 if backwards(params.pattern, layout.along, k) {
                     runs.reverse();
                     runs.iter_mut().for_each(|run| run.reverse());
                 }
-                runs
+                (runs, tilt)
             })
             .collect();
+        planned.iter().for_each(|(_, turned)| tilt.merge(turned));
+        let band: Vec<Vec<Run>> = planned.into_iter().map(|(runs, _)| runs).collect();
         let joints = joints(&layout, first, &band, before);
         let links: Vec<Option<i32>> = joints
             .par_iter()
@@ -180,7 +183,9 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
     if before.is_none() {
         return Err(Error::NoData { samples: lattice.columns * lattice.rows });
     }
-    Ok(pen.finish())
+    let mut path = pen.finish();
+    path.tilt = (params.stock_to_leave_mm == 0.0).then_some(tilt);
+    Ok(path)
 }
 
 /// Whether a pass runs towards lower coordinates. Passes follow each other towards higher ones, so the
@@ -214,11 +219,27 @@ fn joints(
 }
 
 /// The cuts of one pass, towards higher coordinates.
-fn pass(site: &Site, params: &Params, layout: &Layout, envelope: &Envelope) -> Vec<Run> {
+fn pass(
+    site: &Site,
+    params: &Params,
+    layout: &Layout,
+    k: usize,
+    stepover_mm: f64,
+    envelope: &Envelope,
+) -> (Vec<Run>, Tilt) {
+    // On a fine grid any end will do, and what is left for a finer cutter needs no slope.
+    let coarse = site.unit_mm > site.budget.simplify_mm + EXCESS_MM && params.stock_to_leave_mm == 0.0;
+    let measure = ends::Measure {
+        unit_mm: site.unit_mm,
+        pitch_mm: layout.pitch_mm(),
+        stepover_mm,
+        tip_mm: tip_radius_mm(&params.shape),
+    };
     let simplify = site.budget.simplify_mm / site.unit_mm;
     // With what simplification may take below, a whole unit always lies between the bounds.
     let excess = (1.0 - simplify).max(0.0) + EXCESS_MM / site.unit_mm;
     let mut out = Vec::new();
+    let mut tilt = Tilt::default();
     let mut i = 0;
     while i < layout.count {
         if envelope.cl_mm[i].is_nan() {
@@ -232,10 +253,15 @@ fn pass(site: &Site, params: &Params, layout: &Layout, envelope: &Envelope) -> V
                 envelope.bound_mm[i..end].iter().map(|&z| site.units(z + params.stock_to_leave_mm)).collect();
             let low: Vec<f64> = wanted.iter().map(|w| w - simplify).collect();
             let high: Vec<f64> = wanted.iter().map(|w| w + excess).collect();
-            let vertices = funnel::simplify(&low, &high, &wanted);
+            let exact: Vec<f64> = envelope.cl_mm[i..end].iter().map(|&z| site.units(f64::from(z))).collect();
+            let vertices = match coarse {
+                true => ends::lay(&low, &high, &exact, &measure),
+                false => funnel::simplify(&low, &high, &wanted),
+            };
+            tilt.add(&exact, &vertices, &measure, |at| layout.place_mm(k, i + at));
             out.push(vertices.into_iter().map(|(at, z)| [layout.at(i + at), z]).collect());
         }
         i = end;
     }
-    out
+    (out, tilt)
 }

@@ -45,7 +45,7 @@ fn nearest(wanted: f64, low: f64, high: f64) -> Option<f64> {
 }
 
 /// Leaves out vertices that stand exactly on the line of their neighbours.
-fn straighten(vertices: Vec<Vertex>) -> Vec<Vertex> {
+pub(super) fn straighten(vertices: Vec<Vertex>) -> Vec<Vertex> {
     let mut out: Vec<Vertex> = Vec::with_capacity(vertices.len());
     for vertex in vertices {
         while let [.., a, b] = out[..] {

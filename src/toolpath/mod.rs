@@ -1,13 +1,14 @@
 //! Roughing, parallel finishing and the links between passes, on the controller's own grid.
 //!
 //! ```text
-//!   surface --bands--> strip --row of CL--> envelope --funnel--> pass --pen--> Toolpath
-//!                              (certified between samples)  (few vertices)  (links, retracts)
+//!   surface --bands--> strip --row of CL--> envelope --funnel, ends--> pass --pen--> Toolpath
+//!                            (certified between samples)  (few vertices, on the grid)  (links, retracts)
 //! ```
 //!
 //! Planning is in the tile's frame: X0 Y0 at its lower left corner, z = 0 at its highest design point. Only
 //! the last step, to whole units, moves z to the program's zero.
 
+mod ends;
 mod envelope;
 pub mod finish;
 mod funnel;
@@ -17,8 +18,10 @@ mod passes;
 mod pen;
 pub mod rough;
 mod strip;
+mod tilt;
 
 pub use passes::{Axis, Layout};
+pub use tilt::{Tilt, Worst};
 
 use crate::compensation;
 use crate::surface::{self, Surface};
@@ -48,13 +51,14 @@ pub struct Move {
 /// One operation's path in the program frame of its tile. `moves[0]` is a rapid that names X and Y at
 /// the clearance plane and the last one is a rapid up to it. `pass_starts` are the indices of the
 /// rapids at the clearance plane that stand over the begin of a pass: a program may start again at
-/// each of them.
+/// each of them. `tilt` is known of a finish that leaves no stock.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Toolpath {
     /// mm per grid unit: 0.01 for RML-1, 0.0001 for LinuxCNC.
     pub unit_mm: f64,
     pub moves: Vec<Move>,
     pub pass_starts: Vec<usize>,
+    pub tilt: Option<Tilt>,
 }
 
 /// Where an operation is planned: the tile, its blank and its controller's grid.

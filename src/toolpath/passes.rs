@@ -126,6 +126,12 @@ impl Layout {
         f64::from(self.passes[k]) * self.unit_mm
     }
 
+    /// Position `i` of pass `k` in the tile's frame.
+    pub(super) fn place_mm(&self, k: usize, i: usize) -> [f64; 2] {
+        let [x, y, _] = self.along.point(self.at(i), self.passes[k], 0);
+        [f64::from(x) * self.unit_mm, f64::from(y) * self.unit_mm]
+    }
+
     /// Place along a pass of position `i`, in units.
     pub(super) fn at(&self, i: usize) -> i32 {
         self.start + i as i32 * self.pitch

@@ -1,0 +1,256 @@
+//! Vertices of a mirror's moves where its heights fall on a coarse grid.
+//!
+//! On a grid of 10 um a move over a facet of 0.3 mm whose ends are rounded turns the mirror by degrees, and
+//! a pass that runs higher than its neighbours is cut away by them, so that their flanks, turned by
+//! height / stepover, stand in its place. Both are angles. Of all polylines on the grid that stay between
+//! the bounds this one has the least sum of
+//!
+//! ```text
+//!   w ((s - g)^2 + FLANKS ((z - b) / stepover)^2)   at every position, and BLOCK for each move
+//! ```
+//!
+//! s, z: slope and height of the move; g, b: those of the exact cutter location; w: how much of the surface the
+//! position makes. A ball that rolls over a crease stands on one line of it all the way, so w is 0 there, and a
+//! short move of a wrong slope costs nothing. Found by dynamic programming over (position, unit): from each,
+//! the funnel of slopes that stay between the bounds, and the sums of the least squares kept as it goes.
+
+use super::funnel::{Vertex, straighten};
+
+/// Both flanks of a pass turn when it is off, each by the difference of two passes: between once and four times
+/// the square of one. The light of a designed tile is best at four, and flat from there on.
+const FLANKS: f64 = 4.0;
+
+/// What a move costs, in square radians times mm: half a degree over a quarter of a millimetre.
+const BLOCK: f64 = 2e-5;
+
+/// What the squares are measured in.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measure {
+    pub(super) unit_mm: f64,
+    /// Between positions.
+    pub(super) pitch_mm: f64,
+    pub(super) stepover_mm: f64,
+    /// Radius of the cutter's round tip; 0 without one.
+    pub(super) tip_mm: f64,
+}
+
+/// A grid point between the bounds and the cheapest way to it.
+#[derive(Clone, Copy)]
+struct State {
+    z: i32,
+    cost: f64,
+    from: (u32, u8),
+}
+
+/// Sums over the positions behind a state, d positions away and q above it.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    w: f64,
+    wd2: f64,
+    wdq: f64,
+    wq2: f64,
+    wg: f64,
+    wg2: f64,
+}
+
+/// How much of the surface each position makes, 0 to 1: the contact moves by 1 + r z'' of what the axis does.
+pub(super) fn weights(exact: &[f64], measure: &Measure) -> Vec<f64> {
+    let bend = measure.tip_mm * measure.unit_mm / (measure.pitch_mm * measure.pitch_mm);
+    (0..exact.len())
+        .map(|i| match exact.get(i.wrapping_sub(1)..(i + 2).min(exact.len())) {
+            Some(&[a, b, c]) => (1.0 + bend * (a - 2.0 * b + c)).clamp(0.0, 1.0),
+            _ => 1.0,
+        })
+        .collect()
+}
+
+/// Vertices within `low[i] ..= high[i]` (units) at every position, from the first to the last, that follow
+/// `exact` best. The bounds must be a unit apart.
+pub(super) fn lay(low: &[f64], high: &[f64], exact: &[f64], measure: &Measure) -> Vec<Vertex> {
+    let count = low.len();
+    let Some(last) = count.checked_sub(1) else { return Vec::new() };
+    let weights = weights(exact, measure);
+    let slope_cost = (measure.unit_mm / measure.pitch_mm).powi(2);
+    let height_cost = FLANKS * (measure.unit_mm / measure.stepover_mm).powi(2);
+    let block = BLOCK / measure.pitch_mm;
+    let mut states: Vec<State> = Vec::with_capacity(2 * count);
+    let mut starts: Vec<usize> = Vec::with_capacity(count + 1);
+    for i in 0..count {
+        starts.push(states.len());
+        let first = low[i].ceil() as i32;
+        let cost = if i == 0 { 0.0 } else { f64::INFINITY };
+        for z in first..=(high[i].floor() as i32).max(first) {
+            states.push(State { z, cost, from: (0, 0) });
+        }
+    }
+    starts.push(states.len());
+    for i in 0..last {
+        for nth in starts[i]..starts[i + 1] {
+            let State { z, cost, .. } = states[nth];
+            let z = f64::from(z);
+            let (mut least, mut most) = (f64::NEG_INFINITY, f64::INFINITY);
+            let mut sums = Sums::default();
+            for j in i + 1..=last {
+                let d = (j - i) as f64;
+                let (w, g, q) = (weights[j], exact[j] - exact[j - 1], exact[j] - z);
+                sums.w += w;
+                sums.wd2 += w * d * d;
+                sums.wdq += w * d * q;
+                sums.wq2 += w * q * q;
+                sums.wg += w * g;
+                sums.wg2 += w * g * g;
+                let part = 1.0 / d;
+                for state in &mut states[starts[j]..starts[j + 1]] {
+                    let s = (f64::from(state.z) - z) * part;
+                    if s < least || s > most {
+                        continue;
+                    }
+                    let turned = s * s * sums.w - 2.0 * s * sums.wg + sums.wg2;
+                    let raised = s * s * sums.wd2 - 2.0 * s * sums.wdq + sums.wq2;
+                    let cost = cost + block + slope_cost * turned.max(0.0) + height_cost * raised.max(0.0);
+                    if cost < state.cost {
+                        *state = State { cost, from: (i as u32, (nth - starts[i]) as u8), ..*state };
+                    }
+                }
+                least = least.max((low[j] - z) * part);
+                most = most.min((high[j] - z) * part);
+                if least > most {
+                    break;
+                }
+            }
+        }
+    }
+    let mut out = Vec::new();
+    let ends = &states[starts[last]..];
+    let best = (0..ends.len()).min_by(|&a, &b| ends[a].cost.total_cmp(&ends[b].cost)).unwrap_or(0);
+    let mut at = (last, best);
+    loop {
+        let state = states[starts[at.0] + at.1];
+        out.push((at.0, state.z));
+        if at.0 == 0 {
+            break;
+        }
+        at = (state.from.0 as usize, usize::from(state.from.1));
+    }
+    out.reverse();
+    straighten(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const MEASURE: Measure = Measure { unit_mm: 0.01, pitch_mm: 0.01, stepover_mm: 0.05, tip_mm: 0.5 };
+
+    /// The objective by its definition.
+    fn cost(vertices: &[Vertex], exact: &[f64], measure: &Measure) -> f64 {
+        let weights = weights(exact, measure);
+        let mut sum = 0.0;
+        for pair in vertices.windows(2) {
+            let ((a, za), (b, zb)) = (pair[0], pair[1]);
+            let s = f64::from(zb - za) / (b - a) as f64;
+            sum += BLOCK;
+            for i in a + 1..=b {
+                let turned = (s - (exact[i] - exact[i - 1])) * measure.unit_mm / measure.pitch_mm;
+                let raised = (f64::from(za) + s * (i - a) as f64 - exact[i]) * measure.unit_mm;
+                let off = turned.powi(2) + FLANKS * (raised / measure.stepover_mm).powi(2);
+                sum += weights[i] * measure.pitch_mm * off;
+            }
+        }
+        sum
+    }
+
+    /// Every polyline between the bounds, tried.
+    fn least(low: &[f64], high: &[f64], exact: &[f64], done: &mut Vec<Vertex>, best: &mut f64) {
+        let (i, z) = done[done.len() - 1];
+        if i + 1 == low.len() {
+            *best = best.min(cost(done, exact, &MEASURE));
+            return;
+        }
+        for j in i + 1..low.len() {
+            for end in low[j].ceil() as i32..=high[j].floor() as i32 {
+                let s = f64::from(end - z) / (j - i) as f64;
+                let inside = (i + 1..j).all(|p| {
+                    let line = f64::from(z) + s * (p - i) as f64;
+                    line >= low[p] && line <= high[p]
+                });
+                if inside {
+                    done.push((j, end));
+                    least(low, high, exact, done, best);
+                    done.pop();
+                }
+            }
+        }
+    }
+
+    fn bounds(exact: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        (exact.iter().map(|z| z - 0.1).collect(), exact.iter().map(|z| z + 0.95).collect())
+    }
+
+    #[test]
+    fn a_facet_between_two_others_keeps_its_slope() {
+        // Heights of 0.3 mm facets that no unit fits, at slopes that a grid of 10 um cannot draw.
+        let slopes = [0.217, -0.131, 0.083];
+        let mut exact = vec![0.43];
+        for slope in slopes {
+            exact.extend((0..30).map(|_| slope).scan(exact[exact.len() - 1], |z, s| {
+                *z += s;
+                Some(*z)
+            }));
+        }
+        let (low, high) = bounds(&exact);
+        let vertices = lay(&low, &high, &exact, &MEASURE);
+        for (middle, slope) in [15, 45, 75].into_iter().zip(slopes) {
+            let after = vertices.partition_point(|v| v.0 <= middle);
+            let ((a, za), (b, zb)) = (vertices[after - 1], vertices[after]);
+            assert!(b - a >= 12, "{vertices:?}");
+            let turned = f64::from(zb - za) / (b - a) as f64 - slope;
+            assert!(turned.abs() < 0.01, "turned by {turned} at {middle}, {vertices:?}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn no_polyline_is_better(
+            start in 0.0..1.0f64,
+            slopes in proptest::collection::vec(-0.6..0.6f64, 2..4),
+            length in 2usize..5,
+        ) {
+            let mut exact = vec![start];
+            for slope in slopes {
+                for _ in 0..length {
+                    exact.push(exact[exact.len() - 1] + slope);
+                }
+            }
+            let (low, high) = bounds(&exact);
+            let found = cost(&lay(&low, &high, &exact, &MEASURE), &exact, &MEASURE);
+            let mut best = f64::INFINITY;
+            for z in low[0].ceil() as i32..=high[0].floor() as i32 {
+                least(&low, &high, &exact, &mut vec![(0, z)], &mut best);
+            }
+            prop_assert!(found <= best + 1e-9, "{} of {}", found, best);
+        }
+
+        #[test]
+        fn stays_within_its_bounds(
+            steps in proptest::collection::vec(-3.0..3.0f64, 1..150),
+            lift in proptest::collection::vec(0.0..5.0f64, 150),
+        ) {
+            let exact: Vec<f64> = steps.iter().scan(0.0, |z, s| { *z += s; Some(*z) }).collect();
+            let bound: Vec<f64> = exact.iter().zip(&lift).map(|(z, l)| z + (l - 4.0).max(0.0)).collect();
+            let (low, high) = bounds(&bound);
+            let vertices = lay(&low, &high, &exact, &MEASURE);
+            prop_assert_eq!((vertices[0].0, vertices[vertices.len() - 1].0), (0, exact.len() - 1));
+            for pair in vertices.windows(2) {
+                let ((a, za), (b, zb)) = (pair[0], pair[1]);
+                for i in a..=b {
+                    let line = f64::from(za) + f64::from(zb - za) * (i - a) as f64 / (b - a) as f64;
+                    prop_assert!(line >= low[i] - 1e-9 && line <= high[i] + 1e-9, "{} at {}", line, i);
+                }
+            }
+        }
+    }
+}
