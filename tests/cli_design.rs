@@ -1,11 +1,12 @@
-//! `screenmill design` and `limits` as sentences.
+//! `screenmill design`, `limits` and `calibrate` as sentences.
 
 use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
+use glam::{DVec2, DVec3};
 use predicates::prelude::*;
-use screenmill::screen::Design;
+use screenmill::screen::{self, Design, Scene};
 
 fn sample(name: &str) -> String {
     format!("{}/samples/{name}.toml", env!("CARGO_MANIFEST_DIR"))
@@ -154,4 +155,61 @@ fn a_screen_that_shadows_itself_ends_with_1_and_says_where() {
     let scene = coarse(folder.path(), "[-1.0, -0.65, 2.0]", "[-9.0, -0.65, 2.0]");
     screenmill(&["limits", &scene]).code(1).stdout(predicate::str::contains("degrees beyond the limit"));
     screenmill(&["limits", &sample("missing")]).code(2).stderr(predicate::str::contains("missing.toml"));
+}
+
+#[test]
+fn a_mask_is_written_in_16_and_in_8_bits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = coarse(folder.path(), "schema", "schema");
+    let out = folder.path().join("mask.png");
+    let path = out.to_str().expect("text");
+    let said = screenmill(&["calibrate", &scene, "--out", path, "--pixels", "64", "32", "--json"]).success();
+    let json: serde_json::Value = serde_json::from_slice(&said.get_output().stdout).expect("one JSON object");
+    let figure = |key: &str| json["figures"][key].as_f64().expect("a number");
+    assert!((figure("gain_attenuation") - 8.18).abs() < 0.05);
+    let fine = image::open(&out).expect("a picture").into_luma16();
+    let coarse = image::open(folder.path().join("mask-8bit.png")).expect("a picture").into_luma8();
+    assert_eq!((fine.dimensions(), coarse.dimensions()), ((64, 32), (64, 32)));
+    for (a, b) in fine.pixels().zip(coarse.pixels()) {
+        assert!((f64::from(a.0[0]) / 65535.0 - f64::from(b.0[0]) / 255.0).abs() <= 0.5 / 255.0 + 1e-4);
+    }
+    // The top row of the picture is the top of the screen.
+    let coarse = Scene::read(scene.as_ref()).expect("a scene");
+    let l = |x: f64, y: f64| screen::projected_sr(&coarse.audience, DVec3::new(x, y, 0.0), DVec2::ZERO);
+    let of_pixel = |c: u32, r: u32| l((f64::from(c) + 0.5) / 32.0 - 1.0, 0.5 - (f64::from(r) + 0.5) / 32.0);
+    let most = figure("l_max_sr");
+    for (c, r) in [(3, 2), (3, 29), (50, 10)] {
+        let mask = f64::from(fine.get_pixel(c, r).0[0]) / 65535.0;
+        assert!((mask - of_pixel(c, r) / most).abs() < 2e-3, "{c} {r}: {mask}");
+    }
+    assert!((of_pixel(3, 2) / of_pixel(3, 29) - 1.0).abs() > 0.02);
+    // A picture twice as wide as the screen is black beside it.
+    let wide =
+        ["--frustum", "-2", "-0.5", "2", "0.5", "--pixels", "64", "16", "--elevated", "--gamma", "2.2"];
+    screenmill(&[&["calibrate", &scene, "--out", path], &wide[..]].concat())
+        .success()
+        .stdout(predicate::str::contains("by redirection"));
+    let wide = image::open(&out).expect("a picture").into_luma16();
+    assert_eq!(wide.get_pixel(15, 8).0[0], 0);
+    assert!(wide.get_pixel(16, 8).0[0] > 30_000 && wide.get_pixel(47, 8).0[0] > 30_000);
+}
+
+#[test]
+fn a_mask_that_makes_no_sense_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("mask.png");
+    let out = out.to_str().expect("text");
+    let refuse = |flags: &[&str], message: &str| {
+        let scene = sample("theatre");
+        screenmill(&[&["calibrate", scene.as_str()], flags].concat())
+            .code(2)
+            .stderr(predicate::str::contains(message));
+        assert!(is_empty(folder.path()));
+    };
+    refuse(&["--out", &out.replace(".png", ".tif")], "is not a .png");
+    refuse(&["--out", out, "--pixels", "0", "5"], "a mask has 1 to 32768 columns and rows");
+    refuse(&["--out", out, "--frustum", "1", "0", "-1", "1"], "left < right");
+    refuse(&["--out", out, "--frustum", "nan", "0", "1", "1"], "left < right");
+    refuse(&["--out", out, "--gamma", "0"], "an exponent from 0.1 to 10");
+    refuse(&["--out", &format!("{}/no/m.png", folder.path().display()), "--pixels", "2", "2"], "no/m");
 }

@@ -1,6 +1,6 @@
 //! Limits and light of a screen against closed forms, hand-worked cases and naive twins.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use screenmill::optics::half_vector;
 use screenmill::screen::{self, Scene};
 
@@ -119,4 +119,94 @@ fn a_cell_of_4_mm_is_0_6_arcmin_from_23_m() {
     near(acuity.nearest_m, 22.0, 1e-9);
     near(acuity.one_arcmin_m, 13.751, 1e-3);
     assert!(acuity.farthest_m > DVec3::new(1.0, 1.0, 23.9).length());
+}
+
+/// L of Eq. 9 by a grid of directions on the unit disc, where equal areas are equal cos(theta) d(omega).
+fn counted_sr(scene: &Scene, x: DVec3) -> f64 {
+    let across = 1600;
+    let spacing = 2.0 / f64::from(across);
+    let view = scene.view(x);
+    let mut hits = 0u32;
+    for j in 0..across {
+        for i in 0..across {
+            let (u, v) = ((f64::from(i) + 0.5) * spacing - 1.0, (f64::from(j) + 0.5) * spacing - 1.0);
+            let z2 = 1.0 - u * u - v * v;
+            hits += u32::from(z2 > 0.0 && view.hit(DVec3::new(u, v, z2.sqrt())));
+        }
+    }
+    f64::from(hits) * spacing * spacing
+}
+
+#[test]
+fn eq_9_is_what_counting_directions_gives_overlap_and_horizon_included() {
+    let scenes = [
+        sample("theatre"),
+        sample("home-theatre"),
+        // Two boxes one behind the other, partly; one that reaches far round the screen, with its foot behind it.
+        one_cell(&[[[-0.6, 0.3], [-0.4, 0.6], [1.5, 2.0]], [[-0.1, 1.1], [-0.8, 0.2], [2.5, 3.1]]]),
+        one_cell(&[[[0.5, 3.0], [-2.0, 2.0], [0.01, 1.2]]]),
+    ];
+    for (k, scene) in scenes.iter().enumerate() {
+        for x in [DVec3::ZERO, DVec3::new(-0.4, 0.3, 0.02)] {
+            let (exact, counted) =
+                (screen::projected_sr(&scene.audience, x, DVec2::ZERO), counted_sr(scene, x));
+            assert!((exact / counted - 1.0).abs() < 1.5e-3, "{k} {x}: {exact} {counted}");
+        }
+    }
+}
+
+#[test]
+fn a_tilted_base_counts_what_stands_over_it() {
+    let scene = one_cell(&[[[-0.7, 0.9], [-0.4, 0.6], [1.5, 2.0]]]);
+    let l = |tilt| screen::projected_sr(&scene.audience, DVec3::ZERO, tilt);
+    // Linear in the tilt while the whole audience stands above the base.
+    let (flat, x, y) = (l(DVec2::ZERO), l(DVec2::new(0.1, 0.0)), l(DVec2::new(0.0, 0.1)));
+    near(l(DVec2::new(0.3, -0.2)), flat + 3.0 * (x - flat) - 2.0 * (y - flat), 1e-12);
+    // A base turned away sees nothing; turned half away it sees the half that leans to it.
+    assert_eq!(l(DVec2::new(1e9, 0.0)).max(0.0), l(DVec2::new(1e9, 0.0)));
+    assert!(l(DVec2::new(40.0, 0.0)) > 0.0);
+}
+
+#[test]
+fn the_samples_need_the_light_that_an_independent_implementation_found() {
+    // sr: least, centre, most; gain with the mask as a filter.
+    for (name, expected) in [
+        ("theatre", [0.200, 0.319, 0.350, 8.18]),
+        ("conference", [0.351, 0.486, 0.487, 5.88]),
+        ("home-theatre", [0.157, 0.186, 0.187, 15.3]),
+    ] {
+        let mut scene = sample(name);
+        scene.microgeometry.width_mm = 8.0;
+        let figures = screen::calibrate(&scene, None).expect("a calibration").figures;
+        let found = [figures.l_min_sr, figures.l_centre_sr, figures.l_max_sr, figures.gain_attenuation];
+        // By redirection the mean place is the measure; here summed over another grid.
+        let mut sum = 0.0;
+        for at in 0..5000 {
+            let (x, y) = (f64::from(at % 100) * 0.02 - 0.99, f64::from(at / 100) * 0.02 - 0.49);
+            sum += screen::projected_sr(&scene.audience, DVec3::new(x, y, 0.0), DVec2::ZERO);
+        }
+        let redirected = std::f64::consts::PI * figures.reflectance / (sum / 5000.0);
+        assert!((figures.gain_redirection / redirected - 1.0).abs() < 1e-3, "{name}: {redirected}");
+        for (found, expected) in found.iter().zip(expected) {
+            // The table has three figures.
+            assert!((found / expected - 1.0).abs() < 4.5e-3, "{name}: {found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn the_mask_is_eq_9_over_its_largest_value() {
+    let mut scene = sample("theatre");
+    scene.microgeometry.width_mm = 10.0;
+    let calibration = screen::calibrate(&scene, None).expect("a calibration");
+    for (x, y) in [(0.0, 0.0), (-0.913, 0.377), (0.9999, -0.4999), (0.31, -0.123)] {
+        let exact = screen::projected_sr(&scene.audience, DVec3::new(x, y, 0.0), DVec2::ZERO);
+        let mask = calibration.mask(DVec2::new(x, y));
+        near(mask, exact / calibration.figures.l_max_sr, 1e-4);
+    }
+    // A height of 0 everywhere is the flat screen.
+    let zero = screen::Elevation { columns: 200, rows: 100, z_mm: vec![0.0; 20_000] };
+    let same = screen::calibrate(&scene, Some(&zero)).expect("a calibration");
+    near(same.mask(DVec2::new(0.31, -0.123)), calibration.mask(DVec2::new(0.31, -0.123)), 1e-12);
+    near(same.figures.gain_redirection, calibration.figures.gain_redirection, 1e-9);
 }

@@ -1,5 +1,6 @@
 //! Cells turned, scaled and shuffled; scenes mirrored.
 
+use glam::DVec2;
 use screenmill::screen::{self, Scene, Workspace, solve};
 
 fn facets(count: usize) -> (Vec<[f64; 2]>, Vec<f64>) {
@@ -117,4 +118,22 @@ fn a_mirrored_scene_has_mirrored_limits() {
     let (worst, mirrored) = (&a.any_direction.worst, &b.any_direction.worst);
     near(worst.point_m[0], -mirrored.point_m[0]);
     near(worst.corner_m[0], -mirrored.corner_m[0]);
+}
+
+#[test]
+fn a_mirrored_scene_has_the_mirrored_mask() {
+    let of = |scene: &Scene| {
+        let elevation = screen::elevation(scene).expect("an elevation");
+        [screen::calibrate(scene, None), screen::calibrate(scene, Some(&elevation))]
+            .map(|c| c.expect("a mask"))
+    };
+    let (one, other) = (of(&beside(1.0)), of(&beside(-1.0)));
+    for (a, b) in one.iter().zip(&other) {
+        for at in 0..60 {
+            let x = DVec2::new(f64::from(at % 10) / 16.0 - 0.3, f64::from(at / 10) / 14.0 - 0.2);
+            let (a, b) = (a.mask(x), b.mask(DVec2::new(-x.x, x.y)));
+            // Heights settle to 1e-7 m.
+            assert!((a - b).abs() < 2e-6, "{x}: {a} {b}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Arguments, output and exit codes; one file per subcommand. The only place that prints, looks at
 //! the clock or asks for files by name.
 
+mod calibrate;
 mod check;
 mod compensate;
 mod console;
@@ -58,6 +59,7 @@ enum Command {
     Estimate(estimate::Arguments),
     Design(design::Arguments),
     Limits(limits::Arguments),
+    Calibrate(calibrate::Arguments),
     Raster(raster::Arguments),
     Compensate(compensate::Arguments),
     Simulate(simulate::Arguments),
@@ -101,6 +103,7 @@ pub fn run() -> ExitCode {
         Command::Estimate(arguments) => estimate::run(arguments, common),
         Command::Design(arguments) => design::run(arguments, common),
         Command::Limits(arguments) => limits::run(arguments, common),
+        Command::Calibrate(arguments) => calibrate::run(arguments, common),
         Command::Raster(arguments) => raster::run(arguments, common),
         Command::Compensate(arguments) => compensate::run(arguments, common),
         Command::Simulate(arguments) => simulate::run(arguments, common),

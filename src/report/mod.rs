@@ -7,6 +7,7 @@ pub mod files;
 mod format;
 pub mod light_picture;
 pub mod maps;
+pub mod mask;
 pub mod pages;
 mod palette;
 pub mod picture;

@@ -4,6 +4,7 @@
 //! Directional Front Projection Screens". Scenes are in metres, cells in mm.
 
 mod audience;
+mod calibration;
 mod container;
 mod design;
 mod directions;
@@ -21,6 +22,7 @@ mod silhouette;
 mod solid;
 
 pub use audience::{HalfSpace, Polyhedron, View};
+pub use calibration::{Calibration, Figures, calibrate, projected_sr};
 pub use container::ContainerError;
 pub use design::{Cell, CellRange, Design, Facet, FacetPolygon, Profile, Seam};
 pub use directions::{Directions, MOST_SAMPLES, directions};
