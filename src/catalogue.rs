@@ -46,13 +46,26 @@ const MACHINES: &[(&str, &str)] = &[
     file!("grbl-router", "posts/machines/grbl-router.toml"),
     file!("linuxcnc-mill", "posts/machines/linuxcnc-mill.toml"),
     file!("linuxcnc-sim", "posts/machines/linuxcnc-sim.toml"),
+    file!("roland-egx-350", "posts/machines/roland-egx-350.toml"),
+    file!("roland-egx-400", "posts/machines/roland-egx-400.toml"),
     file!("roland-egx-600", "posts/machines/roland-egx-600.toml"),
+    file!("roland-mdx-20", "posts/machines/roland-mdx-20.toml"),
+    file!("roland-mdx-40a", "posts/machines/roland-mdx-40a.toml"),
+    file!("roland-mdx-50", "posts/machines/roland-mdx-50.toml"),
+    file!("roland-mdx-540", "posts/machines/roland-mdx-540.toml"),
     file!("roland-srm-20", "posts/machines/roland-srm-20.toml"),
 ];
 const DIALECTS: &[(&str, &str)] = &[
+    file!("fanuc", "posts/fanuc.toml"),
+    file!("fluidnc", "posts/fluidnc.toml"),
     file!("grbl", "posts/grbl.toml"),
+    file!("grblhal", "posts/grblhal.toml"),
+    file!("haas", "posts/haas.toml"),
     file!("linuxcnc", "posts/linuxcnc.toml"),
+    file!("mach3", "posts/mach3.toml"),
     file!("rml1", "posts/rml1.toml"),
+    file!("rml1-25um", "posts/rml1-25um.toml"),
+    file!("roland-nc", "posts/roland-nc.toml"),
 ];
 const FIXTURES: &[(&str, &str)] = &[
     file!("clamps", "fixtures/clamps.toml"),

@@ -17,15 +17,15 @@ fn json(arguments: &str) -> serde_json::Value {
 #[test]
 fn each_list_names_what_comes_along() {
     screenmill("machines").success().stdout(contains("roland-egx-600").and(contains("610 x 407 x 42.5*")));
-    screenmill("posts").success().stdout(contains("rml1").and(contains("roland-egx-600, roland-srm-20")));
+    screenmill("posts").success().stdout(contains("rml1").and(contains("roland-mdx-540, roland-srm-20")));
     screenmill("fixtures").success().stdout(contains("vacuum-plate").and(contains("clamps")));
     screenmill("tools").success().stdout(contains("ball-0.5").and(contains("320, 80")));
 }
 
 #[test]
 fn each_list_is_one_json_object() {
-    assert_eq!(json("machines --json")["machines"][3]["travel"]["z_mm"], 42.5);
-    assert_eq!(json("posts --json")["posts"][2]["unit_mm"], 0.01);
+    assert_eq!(json("machines roland-egx-600 --json")["travel"]["z_mm"], 42.5);
+    assert_eq!(json("posts --json")["posts"][7]["unit_mm"], 0.01);
     assert_eq!(json("fixtures --json")["fixtures"][0]["clamp"][0]["reach_mm"], 6.0);
     assert_eq!(json("tools --json --library tools-srm-20")["tools"][0]["spindle_rpm"], 7000.0);
 }
@@ -37,13 +37,24 @@ fn one_machine_is_shown_whole_with_what_nobody_confirms() {
         .stdout(contains("set = \"code-0-15\"").and(contains("verify against your machine")));
     assert_eq!(json("tools ball-1 --json")["max_depth_mm"], 0.15);
     screenmill("posts rml1").success().stdout(contains("!MC0"));
+    screenmill("posts fanuc").success().stdout(
+        contains("# x         X       mm             3 decimals, point   when changed  X1.5 is 1.5 mm")
+            .and(contains("# comments   (TEXT), capital letters"))
+            .and(contains("no source confirms limits.line_max: verify against your machine")),
+    );
     screenmill("fixtures clamps").success().stdout(contains("reach_mm = 6.0"));
 }
 
 #[test]
 fn what_is_shown_of_a_machine_is_a_profile_again() {
     let folder = tempfile::tempdir().expect("a scratch folder");
-    for (command, name) in [("machines", "roland-srm-20"), ("posts", "grbl"), ("fixtures", "clamps")] {
+    for (command, name) in [
+        ("machines", "roland-srm-20"),
+        ("machines", "grbl-router"),
+        ("posts", "grbl"),
+        ("posts", "fanuc"),
+        ("fixtures", "clamps"),
+    ] {
         let shown = screenmill(&format!("{command} {name}")).success().get_output().stdout.clone();
         let file = folder.path().join("own.toml");
         std::fs::write(&file, &shown).expect("writable");

@@ -31,8 +31,13 @@ fn small(unit_mm: f64) -> Toolpath {
 fn written(dialect: &str, machine: &str, library: &str, z_zero: ZZero) -> String {
     let dialect = Dialect::find(dialect, None).expect("a dialect that comes along");
     let machine = Machine::find(machine, None).expect("a machine that comes along");
+    // Controllers with a tool table are shown with a changer.
+    let tool_changer = matches!(dialect.name.as_str(), "mach3" | "haas" | "fanuc");
+    let machine = Machine { tool_changer, ..machine };
     let library = Library::find(library, None).expect("a library that comes along");
     let path = small(dialect.unit_mm);
+    let mut tool = library.tool("ball-1").expect("in the library").clone();
+    tool.spindle_rpm = tool.spindle_rpm.clamp(machine.spindle.rpm_min, machine.spindle.rpm_max);
     let stock = StockFacts {
         material: "aluminium-6082".into(),
         width_mm: 26.0,
@@ -45,7 +50,9 @@ fn written(dialect: &str, machine: &str, library: &str, z_zero: ZZero) -> String
         part: "Kino (Saal 3) ~ größe!",
         tile: "r0c0",
         operation: "finish",
-        tool: library.tool("ball-1").expect("in the library"),
+        number: 1,
+        section: None,
+        tool: &tool,
         stock: &stock,
         z_zero,
         wcs: "G54",
@@ -64,6 +71,11 @@ fn programs_are_these_bytes() {
     let cases = [
         ("linuxcnc.ngc", written("linuxcnc", "linuxcnc-mill", "tools", ZZero::StockTop)),
         ("linuxcnc-part-top.ngc", written("linuxcnc", "linuxcnc-mill", "tools", ZZero::PartTop)),
+        ("mach3.tap", written("mach3", "linuxcnc-mill", "tools", ZZero::StockTop)),
+        ("haas.nc", written("haas", "linuxcnc-mill", "tools", ZZero::StockTop)),
+        ("fanuc.nc", written("fanuc", "linuxcnc-mill", "tools", ZZero::StockTop)),
+        ("mdx-20.rml", written("rml1-25um", "roland-mdx-20", "tools", ZZero::StockTop)),
+        ("srm-20.nc", written("roland-nc", "roland-srm-20", "tools-srm-20", ZZero::StockTop)),
         ("grbl.nc", written("grbl", "grbl-router", "tools", ZZero::StockTop)),
         ("egx-600.rml", written("rml1", "roland-egx-600", "tools", ZZero::StockTop)),
         ("srm-20.rml", written("rml1", "roland-srm-20", "tools-srm-20", ZZero::StockTop)),

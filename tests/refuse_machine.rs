@@ -1,7 +1,7 @@
 //! Bad data files and names on the command line: tests/refuse/machine/*.txt. The first line of a
 //! case is the message, the second the arguments, the rest the file `bad.toml` beside them.
 //! `{profile}`, `{dialect}`, `{fixture}` and `{library}` stand for a good file, with the
-//! replacements `old => new` that follow.
+//! replacements `old => new` that follow; `\n` in one begins a line.
 
 use std::path::PathBuf;
 
@@ -27,7 +27,7 @@ fn content(lines: &[&str]) -> String {
     for line in &lines[1..] {
         let (old, new) = line.split_once(" => ").expect("old => new");
         assert!(text.contains(old), "{old} is not in the good file");
-        text = text.replacen(old, new, 1);
+        text = text.replacen(old, &new.replace("\\n", "\n"), 1);
     }
     text
 }

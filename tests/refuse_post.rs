@@ -90,6 +90,8 @@ fn program(change: &str) -> String {
         part: "p",
         tile: "r0c0",
         operation: "finish",
+        number: 1,
+        section: None,
         tool: &tool,
         stock: &stock,
         z_zero: ZZero::StockTop,

@@ -2,11 +2,22 @@
 
 use proptest::prelude::*;
 use screenmill::machine::{Library, Machine, Tool};
-use screenmill::post::{self, Dialect, Program, StockFacts, ZZero};
+use screenmill::post::{self, Dialect, Point, Program, StockFacts, ZZero};
 use screenmill::toolpath::{GridPoint, Kind, Move, Toolpath};
 
-const DIALECTS: [(&str, &str); 3] =
-    [("linuxcnc", "linuxcnc-mill"), ("grbl", "grbl-router"), ("rml1", "roland-egx-600")];
+/// Dialect, machine, and how it spells 320 and 80 mm/min, then 30 and 15 mm/s where rapids need them.
+const DIALECTS: [(&str, &str, [&str; 4]); 10] = [
+    ("linuxcnc", "linuxcnc-mill", ["320", "80", "", ""]),
+    ("grbl", "grbl-router", ["320", "80", "", ""]),
+    ("grblhal", "grbl-router", ["320", "80", "", ""]),
+    ("fluidnc", "grbl-router", ["320", "80", "", ""]),
+    ("mach3", "linuxcnc-mill", ["320", "80", "", ""]),
+    ("haas", "linuxcnc-mill", ["320.0", "80.0", "", ""]),
+    ("fanuc", "linuxcnc-mill", ["320.", "80.", "", ""]),
+    ("roland-nc", "linuxcnc-mill", ["320.0", "80.0", "", ""]),
+    ("rml1", "roland-egx-600", ["5.3", "1.3", "30.0", "15.0"]),
+    ("rml1-25um", "roland-egx-600", ["5.3", "1.3", "30.0", "15.0"]),
+];
 
 fn text_of(path: &Toolpath, tool: &Tool, dialect: &Dialect, machine: &Machine) -> Vec<u8> {
     let stock = StockFacts {
@@ -21,6 +32,8 @@ fn text_of(path: &Toolpath, tool: &Tool, dialect: &Dialect, machine: &Machine) -
         part: "p",
         tile: "r0c0",
         operation: "finish",
+        number: 1,
+        section: None,
         tool,
         stock: &stock,
         z_zero: ZZero::StockTop,
@@ -51,7 +64,9 @@ fn read_g_code(text: &str, decimals: usize) -> Vec<Read> {
     let mut at = [0; 3];
     let (mut rapid, mut feed) = (true, String::new());
     let mut motions = Vec::new();
-    for line in text.lines().filter(|line| !line.starts_with('(')) {
+    // From the first pass mark on, the first motion names everything; M5 begins the end.
+    let body = text.lines().skip_while(|line| !line.eq_ignore_ascii_case("(pass 1)"));
+    for line in body.take_while(|line| *line != "M5").filter(|line| !line.starts_with('(')) {
         let mut moved = false;
         for word in line.split(' ') {
             let (letter, value) = word.split_at(1);
@@ -70,7 +85,6 @@ fn read_g_code(text: &str, decimals: usize) -> Vec<Read> {
             motions.push(Read { to: at, feed: (!rapid).then(|| feed.clone()) });
         }
     }
-    motions.remove(0);
     motions
 }
 
@@ -145,7 +159,7 @@ proptest! {
     ) {
         let library = Library::find("tools", None).expect("embedded");
         let tool = library.tool("ball-1").expect("in it");
-        for (name, machine) in DIALECTS {
+        for (name, machine, feeds) in DIALECTS {
             let dialect = Dialect::find(name, None).expect("embedded");
             let machine = Machine::find(machine, None).expect("embedded");
             let path = path(dialect.unit_mm, &steps);
@@ -159,15 +173,21 @@ proptest! {
                 prop_assert!(!line.is_empty() && line.len() <= dialect.limits.line_max, "{name}: {line}");
                 prop_assert!(line.bytes().all(|b| (b' '..=b'~').contains(&b)), "{name}: {line}");
                 prop_assert!(!line.contains(|c| dialect.limits.forbidden.contains(c)), "{name}: {line}");
-                for word in line.split([' ', ',', ';']) {
+                for word in line.split([' ', ',', ';']).filter(|_| !line.starts_with('(')) {
                     prop_assert!(!dialect.limits.missing.iter().any(|m| m == word), "{name}: {line}");
                 }
             }
-            let (read, want) = match name {
-                "linuxcnc" => (read_g_code(&text, 4), wanted(&path, clearance, ["320", "80", "", ""], false)),
-                "grbl" => (read_g_code(&text, 3), wanted(&path, clearance, ["320", "80", "", ""], false)),
-                _ => (read_rml(&text), wanted(&path, clearance, ["5.3", "1.3", "30.0", "15.0"], true)),
+            if dialect.word.x.point == Point::Always {
+                let bare = |word: &str| "XYZF".contains(&word[..1]) && !word.contains('.');
+                for line in lines.iter().filter(|line| !line.starts_with('(') && !line.is_empty()) {
+                    prop_assert!(!line.split(' ').any(bare), "{name}: a number without a point: {line}");
+                }
+            }
+            let read = match dialect.comment {
+                Some(_) => read_g_code(&text, dialect.word.x.decimals as usize),
+                None => read_rml(&text),
             };
+            let want = wanted(&path, clearance, feeds, dialect.word.feed.rapids);
             prop_assert_eq!(read, want, "{}", name);
         }
     }
@@ -238,5 +258,9 @@ fn linuxcnc_reads_it_as_meant() {
     // rs274 -g has the origin of its G55 at zero, and the lift of the start block comes first.
     let want: Vec<GridPoint> =
         wanted(&path, 50_000, ["", "", "", ""], false).into_iter().map(|read| read.to).collect();
-    assert_eq!(ends[1..], want);
+    // The last goes to the back left corner of the motions, on the clearance plane.
+    let (park, cut) = ends[1..].split_last().expect("motions");
+    assert_eq!(cut, want);
+    let edge = |axis: usize, pick: fn(i32, i32) -> i32| want.iter().map(|to| to[axis]).reduce(pick);
+    assert_eq!(Some(*park), edge(0, i32::min).zip(edge(1, i32::max)).map(|(x, y)| [x, y, 50_000]));
 }

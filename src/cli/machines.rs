@@ -5,7 +5,7 @@ use screenmill::machine::{Machine, SpindleLaw};
 
 use super::{Common, Outcome, Refusal};
 
-/// List the machines, or show and check one
+/// List the machines, or explain and check one
 #[derive(clap::Args)]
 pub struct Arguments {
     /// A machine's name, or the path of a profile to check
@@ -19,8 +19,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         if common.json {
             println!("{}", serde_json::to_string(&machine)?);
         } else {
-            print!("{}", toml::to_string_pretty(&machine)?);
-            print_unconfirmed(&machine);
+            for line in explained(&machine) {
+                println!("{}", format!("# {line}").trim_end());
+            }
+            print!("\n{}", toml::to_string_pretty(&machine)?);
         }
         return Ok(Outcome::Within);
     }
@@ -32,7 +34,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         return Ok(Outcome::Within);
     }
     println!(
-        "machine          travel mm            feed mm/min      spindle rpm    posts; * verify against your machine"
+        "machine         travel mm             feed mm/min    spindle rpm            posts; * verify against your machine"
     );
     for machine in &machines {
         let star = |unconfirmed| if unconfirmed { "*" } else { "" };
@@ -56,14 +58,47 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
             machine.spindle.rpm_max,
             star(machine.spindle.unconfirmed)
         );
-        println!("{:<16} {travel:<20} {feed:<16} {rpm:<22} {}", machine.name, machine.dialects.join(", "));
+        println!("{:<15} {travel:<21} {feed:<14} {rpm:<22} {}", machine.name, machine.dialects.join(", "));
     }
+    println!("\nscreenmill machines NAME explains one.");
     Ok(Outcome::Within)
 }
 
-fn print_unconfirmed(machine: &Machine) {
-    let sections = machine.unconfirmed();
-    if !sections.is_empty() {
-        println!("\n# No source confirms {}: verify against your machine.", sections.join(", "));
+/// A machine in words; the file itself follows.
+fn explained(machine: &Machine) -> Vec<String> {
+    let Machine { travel, rate, spindle, .. } = machine;
+    let seconds = |mm_min: f64| format!("{mm_min} mm/min ({:.1} mm/s)", mm_min / 60.0);
+    let law = match spindle.set {
+        SpindleLaw::Rpm => "the program names rpm".into(),
+        SpindleLaw::ByHand => "set by hand".into(),
+        SpindleLaw::CodeFrom0 => {
+            let step = (spindle.rpm_max - spindle.rpm_min) / 15.0;
+            format!("!RC codes 0 to 15, {step:.1} rpm apart")
+        }
+        SpindleLaw::CodeFrom1 => {
+            let step = (spindle.rpm_max - spindle.rpm_min) / 14.0;
+            format!("!RC codes 1 to 15, {step:.1} rpm apart")
+        }
+    };
+    let mut lines = vec![
+        format!("{}: {}", machine.name, machine.title),
+        String::new(),
+        format!("travel     {} x {} x {} mm", travel.x_mm, travel.y_mm, travel.z_mm),
+        format!(
+            "feeds      from {}; X and Y to {}, Z to {}",
+            rate.feed_min_mm_min,
+            seconds(rate.feed_xy_max_mm_min),
+            seconds(rate.feed_z_max_mm_min)
+        ),
+        format!("spindle    {} to {} rpm, {law}", spindle.rpm_min, spindle.rpm_max),
+        format!("posts      {}; the first unless a job asks for another", machine.dialects.join(", ")),
+    ];
+    lines.extend(machine.notes.iter().map(|note| format!("note       {note}")));
+    let figures = machine.unconfirmed_figures();
+    if !figures.is_empty() {
+        lines.push(String::new());
+        lines.push("No source confirms these: verify against your machine.".into());
+        lines.extend(figures.iter().map(|figure| format!("  {figure}")));
     }
+    lines
 }

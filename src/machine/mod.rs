@@ -12,7 +12,7 @@ mod tool;
 pub use collision::{Guard, Met};
 pub use error::Error;
 pub use fixture::{Border, Clamp, Fixture, KeepOut, Side};
-pub use profile::{Corner, Machine, Motion, PerAxis, Rate, Spindle, SpindleLaw, Transfer, Travel};
+pub use profile::{Coolant, Corner, Machine, Motion, PerAxis, Rate, Spindle, SpindleLaw, Transfer, Travel};
 pub use setup::{Bounds, Obstacle, Setup};
 pub use spindle::SpindleSetting;
 pub use split::{Blanks, Quantum, Stock, Tile, ZNeed, fits_z, floor_mm, split, split_in_z};

@@ -24,6 +24,9 @@ pub struct Machine {
     pub rate: Rate,
     pub motion: Motion,
     pub spindle: Spindle,
+    /// None where nothing is switched by programs.
+    #[serde(default)]
+    pub coolant: Option<Coolant>,
     pub transfer: Transfer,
 }
 
@@ -131,6 +134,17 @@ pub struct Spindle {
     pub unconfirmed: bool,
 }
 
+/// The words that switch flood, mist or air.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Coolant {
+    pub on: String,
+    pub off: String,
+    pub source: String,
+    #[serde(default)]
+    pub unconfirmed: bool,
+}
+
 /// How a program reaches the controller.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -145,6 +159,9 @@ pub struct Transfer {
     #[serde(default)]
     pub unconfirmed: bool,
 }
+
+/// Words for flood, mist and air of the controllers that are known.
+const COOLANT: [&str; 5] = ["M7", "M8", "M9", "M12", "M13"];
 
 impl Machine {
     /// The machine that `name` means to a job in `folder`.
@@ -182,6 +199,13 @@ impl Machine {
         source.within("spindle.rpm_max", spindle.rpm_max, spindle.rpm_min, 1e6)?;
         source.within("spindle.spin_up_s", spindle.spin_up_s, 0.0, 600.0)?;
         source.within("spindle.nose_diameter_mm", spindle.nose_diameter_mm, 0.1, 1000.0)?;
+        if let Some(coolant) = &machine.coolant {
+            let words = [("coolant.on", &coolant.on), ("coolant.off", &coolant.off)];
+            let strange = words.iter().find(|(_, word)| !COOLANT.contains(&word.as_str()));
+            if let Some((key, word)) = strange {
+                return Err(source.unknown_value(key, word, &COOLANT));
+            }
+        }
         if let Some(baud) = transfer.baud {
             source.within("transfer.baud", baud.into(), 1.0, 1e10)?;
         }
@@ -198,11 +222,46 @@ impl Machine {
             ("rate", self.rate.unconfirmed),
             ("motion", self.motion.unconfirmed),
             ("spindle", self.spindle.unconfirmed),
+            ("coolant", self.coolant.as_ref().is_some_and(|coolant| coolant.unconfirmed)),
             ("transfer", self.transfer.unconfirmed),
         ]
         .into_iter()
         .filter_map(|(section, unconfirmed)| unconfirmed.then_some(section))
         .collect()
+    }
+
+    /// The same with their figures and what they are taken from, a line each.
+    pub fn unconfirmed_figures(&self) -> Vec<String> {
+        let Machine { travel, rate, motion, spindle, transfer, .. } = self;
+        let a = motion.acceleration_mm_s2;
+        let coolant = self.coolant.as_ref();
+        let lines = [
+            (
+                travel.unconfirmed,
+                format!("travel {} x {} x {} mm ({})", travel.x_mm, travel.y_mm, travel.z_mm, travel.source),
+            ),
+            (
+                rate.unconfirmed,
+                format!(
+                    "feeds up to {} mm/min in X and Y, {} in Z ({})",
+                    rate.feed_xy_max_mm_min, rate.feed_z_max_mm_min, rate.source
+                ),
+            ),
+            (
+                motion.unconfirmed,
+                format!("accelerations {}, {}, {} mm/s2 ({})", a.x, a.y, a.z, motion.source),
+            ),
+            (
+                spindle.unconfirmed,
+                format!("spindle {} to {} rpm ({})", spindle.rpm_min, spindle.rpm_max, spindle.source),
+            ),
+            (
+                coolant.is_some_and(|coolant| coolant.unconfirmed),
+                coolant.map_or(String::new(), |c| format!("coolant {} and {} ({})", c.on, c.off, c.source)),
+            ),
+            (transfer.unconfirmed, format!("transfer ({})", transfer.source)),
+        ];
+        lines.into_iter().filter_map(|(unconfirmed, line)| unconfirmed.then_some(line)).collect()
     }
 
     /// Whether its controller reads the dialect. A job may ask for another: it is written, and

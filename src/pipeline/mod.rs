@@ -18,6 +18,7 @@ mod maps;
 mod pages;
 mod part;
 mod plan;
+mod press;
 mod relit;
 mod report;
 mod rescue;

@@ -124,7 +124,8 @@ fn sheet(job: &Job, shop: &Shop, report: &Report, results: &[TileResult]) -> Set
         material: job.stock.material.clone(),
         made_by: format!("screenmill {}", env!("CARGO_PKG_VERSION")),
         warnings: warned.map(|finding| finding.message.clone()).collect(),
-        unconfirmed: machine.unconfirmed().iter().map(|section| section.to_string()).collect(),
+        unconfirmed: unconfirmed(shop),
+        machine_notes: machine_notes(shop),
         abort: vec![
             "Stop the spindle and the motion on the machine's panel; clear its buffer before anything else is sent."
                 .into(),
@@ -136,6 +137,22 @@ fn sheet(job: &Job, shop: &Shop, report: &Report, results: &[TileResult]) -> Set
         ],
         tiles: results.iter().map(|result| sheet_tile(job, shop, result)).collect(),
     }
+}
+
+/// Figures of machine and dialects that no source confirms.
+fn unconfirmed(shop: &Shop) -> Vec<String> {
+    let mut lines = shop.machine.unconfirmed_figures();
+    for dialect in shop.dialects.iter().filter(|dialect| !dialect.unconfirmed.is_empty()) {
+        lines.push(format!("{} of the post {}", dialect.unconfirmed.join(", "), dialect.name));
+    }
+    lines
+}
+
+/// What machine and dialects ask of the operator.
+fn machine_notes(shop: &Shop) -> Vec<String> {
+    let dialects = shop.dialects.iter();
+    let of_posts = dialects.flat_map(|d| d.notes.iter().map(|note| format!("{}: {note}", d.name)));
+    shop.machine.notes.iter().cloned().chain(of_posts).collect()
 }
 
 fn sheet_tile(job: &Job, shop: &Shop, result: &TileResult) -> SheetTile {
@@ -172,7 +189,8 @@ fn sheet_tile(job: &Job, shop: &Shop, result: &TileResult) -> SheetTile {
                 tool: tool.name.clone(),
                 time_s: program.timing.total_s,
                 bounds_mm: Bounds { x: [low[0], high[0]], y: [low[1], high[1]], z: [low[2], high[2]] },
-                re_zero_z: before.is_some_and(|name| name != tool.name.as_str()),
+                re_zero_z: before.is_some_and(|name| name != tool.name.as_str())
+                    || program.section.is_some_and(|section| section.index > 1 && section.fresh_cutter),
             });
             before = Some(tool.name.as_str());
         }

@@ -1,23 +1,22 @@
 //! From a tile to program files, and the files read back.
 
-use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::Error;
 use super::judge::ExactPasses;
 use super::part::TileSurface;
+use super::press::Press;
 use super::shop::Shop;
 use crate::compensation::Profile;
 use crate::cutter::Shape;
 use crate::job::{self, Job, ZZero};
 use crate::machine::{Bounds, Guard, Setup, Tool, ZNeed};
-use crate::post::{self, Dialect};
+use crate::post::{Dialect, Section};
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::tolerance::Budget;
 use crate::toolpath::{self, Retract, Site, finish, rough};
-use crate::verify::{self, Extent, Reading, Timing};
+use crate::verify::{Extent, Reading, Timing};
 
 /// Passes between two places where a zigzag program can start again.
 const RESTART_PASSES: usize = 50;
@@ -43,6 +42,8 @@ pub struct Program {
     pub file: PathBuf,
     /// Position among the job's operations.
     pub operation: usize,
+    /// None where the operation is one program.
+    pub section: Option<Section>,
     pub reading: Reading,
     pub extent: Extent,
     pub timing: Timing,
@@ -246,84 +247,11 @@ pub fn programs(
         if progress.interrupted() {
             return Err(Error::Interrupted);
         }
-        progress.begin("write", 1);
-        let file = program_file(job, shop, &tile.setup.tile.name, dialect, index, tool);
-        write(job, shop, tile, dialect, index, &path, &folder.join(&file))?;
-        let tilt = path.tilt;
-        drop(path);
-        progress.begin("read back", 1);
-        let program = read_back(shop, dialect, folder, file, index)?;
-        planned.programs.push(Program { tilt, ..program });
+        let number = planned.programs.len() as u32 + 1;
+        let press = Press { job, shop, tile, dialect, folder, progress };
+        planned.programs.extend(press.print(index, number, &path)?);
     }
     Ok(planned)
-}
-
-/// `programs/<tile>-<nn>-<operation>-<tool>.<ext>`, in a folder for each post where there are several.
-fn program_file(job: &Job, shop: &Shop, tile: &str, dialect: &Dialect, index: usize, tool: &Tool) -> PathBuf {
-    let tool = tool.name.replace(':', "-");
-    let kind = job.operations[index].kind.word();
-    let name = format!("{tile}-{:02}-{kind}-{tool}.{}", index + 1, dialect.extension);
-    let programs = Path::new("programs");
-    if shop.dialects.len() > 1 { programs.join(&dialect.name).join(name) } else { programs.join(name) }
-}
-
-fn read_back(
-    shop: &Shop,
-    dialect: &Dialect,
-    folder: &Path,
-    file: PathBuf,
-    operation: usize,
-) -> Result<Program, Error> {
-    let path = folder.join(&file);
-    let open = File::open(&path).map_err(|source| Error::Output { path: path.clone(), source })?;
-    let options = verify::Options { rml_unit_mm: dialect.unit_mm };
-    let reading = Reading::from(&mut BufReader::with_capacity(1 << 20, open), &options)
-        .map_err(|source| Error::ReadBack { path: file.clone(), source })?;
-    let extent = reading.extent();
-    let timing = verify::time(&reading, &(&shop.machine).into());
-    Ok(Program { file, operation, reading, extent, timing, tilt: None })
-}
-
-/// Writes one program; a file that could not be finished keeps no name.
-fn write(
-    job: &Job,
-    shop: &Shop,
-    tile: &TileSetup,
-    dialect: &Dialect,
-    index: usize,
-    path: &toolpath::Toolpath,
-    file: &Path,
-) -> Result<(), Error> {
-    let output = |source| Error::Output { path: file.to_path_buf(), source };
-    if let Some(folder) = file.parent() {
-        std::fs::create_dir_all(folder).map_err(output)?;
-    }
-    let blank = tile.setup.blank;
-    let stock = post::StockFacts {
-        material: job.stock.material.clone(),
-        width_mm: blank.high_mm[0] - blank.low_mm[0],
-        height_mm: blank.high_mm[1] - blank.low_mm[1],
-        thickness_mm: job.stock.thickness_mm,
-        top_allowance_mm: tile.allowance_mm,
-    };
-    let program = post::Program {
-        path,
-        part: &job.name,
-        tile: &tile.setup.tile.name,
-        operation: job.operations[index].kind.word(),
-        tool: &shop.tools[index],
-        stock: &stock,
-        z_zero: match job.stock.z_zero {
-            ZZero::StockTop => post::ZZero::StockTop,
-            ZZero::PartTop => post::ZZero::PartTop,
-        },
-        wcs: &job.machine.wcs,
-        clearance_mm: tile.allowance_mm - tile.z_zero_mm + tile.clearance_mm,
-        notes: &[],
-    };
-    let mut out = BufWriter::with_capacity(1 << 20, File::create(file).map_err(output)?);
-    post::write(&program, dialect, &shop.machine, &mut out)?;
-    out.flush().map_err(output)
 }
 
 /// A place of the program as the setup has it: z above the stock's top.

@@ -1,10 +1,12 @@
 use std::path::Path;
 
-use minijinja::{Environment, UndefinedBehavior, Value, context};
 use serde::{Deserialize, Serialize};
 
 use super::Error;
+use super::block::Facts;
+use super::number::decimal_steps;
 use crate::catalogue::{self, Kind};
+use crate::machine::Machine;
 use crate::settings::Source;
 
 /// How a controller wants its programs spelled: a word table for the motions and blocks of pure
@@ -29,6 +31,12 @@ pub struct Dialect {
     /// Work coordinate systems that a program can name; none where the origin is set by hand.
     pub wcs: Vec<String>,
     pub source: String,
+    /// Keys of this file that no source confirms; what is shown to an operator says so.
+    #[serde(default)]
+    pub unconfirmed: Vec<String>,
+    /// What an operator has to know or to set.
+    #[serde(default)]
+    pub notes: Vec<String>,
     pub limits: Limits,
     /// None where a comment would be run.
     #[serde(default)]
@@ -78,6 +86,31 @@ pub struct Comment {
     pub close: String,
     /// Characters that may not stand in one; they are written as `_`.
     pub forbidden: String,
+    /// Whether the controller has capital letters only.
+    #[serde(default)]
+    pub upper_case: bool,
+    /// Between what a line is about and what it says.
+    #[serde(default = "colon")]
+    pub label: String,
+}
+
+fn colon() -> String {
+    ": ".into()
+}
+
+impl Comment {
+    /// A line of its own, with what may not stand in it replaced.
+    pub(super) fn line(&self, text: &str, limits: &Limits) -> String {
+        format!("{}{}{}", self.open, self.clean(text, limits), self.close)
+    }
+
+    /// Text without what may not stand in a comment, or anywhere.
+    pub(super) fn clean(&self, text: &str, limits: &Limits) -> String {
+        let bad =
+            |c: char| !(' '..='~').contains(&c) || self.forbidden.contains(c) || limits.forbidden.contains(c);
+        let spelled = |c: char| if self.upper_case { c.to_ascii_uppercase() } else { c };
+        text.chars().map(spelled).map(|c| if bad(c) { '_' } else { c }).collect()
+    }
 }
 
 /// The words of a motion, in the order in which they are written.
@@ -172,9 +205,12 @@ pub struct Feed {
 
 /// Spelling around the motions; templates of minijinja. Lines that come out empty are left out.
 ///
-/// Names: `wcs`, `clearance`, `x`, `y`, `z` (the first point), `rpm`, `code` (none on machines
-/// without), `by_hand`, `spin_up_s`, `spin_up_ms`, `rapid_xy`, `rapid_z` (feed words' numbers),
-/// `path_tolerance_mm`, `merge_tolerance_mm`, `tool_changer`, `tool_number`.
+/// Names: `wcs`, `clearance`, `x`, `y`, `z` (the first point), `park_x`, `park_y` (the back left
+/// corner of the program's motions), `rpm`, `code` (none on machines
+/// without), `by_hand`, `spin_up_s`, `spin_up_ms`, `rapid_xy`, `rapid_z` (feed words'
+/// numbers), `path_tolerance_mm`, `merge_tolerance_mm`, `tool_changer`, `tool_number`, `coolant_on`,
+/// `coolant_off` (none on machines without), `program_number`. Filters beside minijinja's own:
+/// `point` (3 becomes 3.0), `digits(n)` (leading zeros).
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blocks {
@@ -190,21 +226,9 @@ pub struct Blocks {
     pub end: String,
 }
 
-/// What the blocks of one program may name.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Facts {
-    pub wcs: String,
-    pub clearance: String,
-    pub first: [String; 3],
-    pub rpm: i64,
-    pub code: Option<u8>,
-    pub by_hand: bool,
-    pub spin_up_ms: i64,
-    pub rapid_xy: String,
-    pub rapid_z: String,
-    pub tool_changer: bool,
-    pub tool_number: u32,
-}
+/// Where a key that no source confirms may stand.
+const KEYS: [&str; 7] =
+    ["unit_mm", "path_tolerance_mm", "merge_tolerance_mm", "limits", "comment", "word", "block"];
 
 impl Dialect {
     /// The dialect that `name` means to a job in `folder`.
@@ -221,6 +245,7 @@ impl Dialect {
         source.within("path_tolerance_mm", dialect.path_tolerance_mm, 0.0, 1.0)?;
         source.within("merge_tolerance_mm", dialect.merge_tolerance_mm, 0.0, 1.0)?;
         source.within("extension", dialect.extension.len() as f64, 1.0, 10.0)?;
+        dialect.check_spelling(source)?;
         source.within("limits.line_max", dialect.limits.line_max as f64, 40.0, 10_000.0)?;
         source.within("limits.value_max", dialect.limits.value_max as f64, 1.0, 1e12)?;
         source.within("limits.dwell_max_s", dialect.limits.dwell_max_s, 0.0, 1e6)?;
@@ -244,44 +269,14 @@ impl Dialect {
                 block,
                 message,
             };
-            for facts in dialect.trials() {
-                for line in dialect.spell(template, &facts).map_err(broken)? {
+            for facts in Facts::trials(&dialect) {
+                for line in facts.spell(template, &dialect).map_err(broken)? {
                     dialect.check_line(line.as_bytes()).map_err(broken)?;
                     dialect.check_words(&line).map_err(broken)?;
                 }
             }
         }
         Ok(dialect)
-    }
-
-    /// The lines of a block.
-    pub(super) fn spell(&self, template: &str, facts: &Facts) -> Result<Vec<String>, String> {
-        let mut environment = Environment::new();
-        environment.set_undefined_behavior(UndefinedBehavior::Strict);
-        let values = context! {
-            wcs => &facts.wcs,
-            clearance => &facts.clearance,
-            x => &facts.first[0],
-            y => &facts.first[1],
-            z => &facts.first[2],
-            rpm => facts.rpm,
-            code => facts.code.map_or(Value::from(()), Value::from),
-            by_hand => facts.by_hand,
-            spin_up_s => number(facts.spin_up_ms, 3, Point::Fraction),
-            spin_up_ms => facts.spin_up_ms,
-            rapid_xy => &facts.rapid_xy,
-            rapid_z => &facts.rapid_z,
-            path_tolerance_mm => self.path_tolerance_mm,
-            merge_tolerance_mm => self.merge_tolerance_mm,
-            tool_changer => facts.tool_changer,
-            tool_number => facts.tool_number,
-        };
-        let text = environment.render_str(template, values).map_err(|error| {
-            let place = error.line().map_or(String::new(), |line| format!(" in its line {line}"));
-            let detail = error.detail().map_or(String::new(), |detail| format!(": {detail}"));
-            format!("{}{detail}{place}", error.kind())
-        })?;
-        Ok(text.lines().map(str::trim).filter(|line| !line.is_empty()).map(String::from).collect())
     }
 
     /// What of a line the controller cannot take.
@@ -296,6 +291,54 @@ impl Dialect {
             }
             None => Ok(()),
         }
+    }
+
+    /// The machine's words for coolant; None where it has none or the controller does not know them.
+    pub(super) fn coolant(&self, machine: &Machine) -> Option<[String; 2]> {
+        let coolant = machine.coolant.as_ref()?;
+        let words = [coolant.on.clone(), coolant.off.clone()];
+        words.iter().all(|word| self.check_words(word).is_ok()).then_some(words)
+    }
+
+    /// What is written as it stands: letters, separator, comment marks, extension.
+    fn check_spelling(&self, source: &Source) -> Result<(), Error> {
+        let refuse = |key: &str, message: String| Error::Spelling {
+            path: source.path().into(),
+            line: source.line_of(key),
+            key: key.into(),
+            message,
+        };
+        if !self.extension.chars().all(|c| c.is_ascii_alphanumeric()) {
+            let message = format!("\"{}\" ends no file name", self.extension.escape_debug());
+            return Err(refuse("extension", message));
+        }
+        let word = &self.word;
+        let mut spellings: Vec<(&str, &str)> = vec![
+            ("separator", &self.separator),
+            ("word.rapid.letter", &word.rapid.letter),
+            ("word.cut.letter", &word.cut.letter),
+            ("word.x.letter", &word.x.letter),
+            ("word.y.letter", &word.y.letter),
+            ("word.z.letter", &word.z.letter),
+            ("word.feed.letter", &word.feed.letter),
+        ];
+        spellings.extend(self.wcs.iter().map(|name| ("wcs", name.as_str())));
+        if let Some(comment) = &self.comment {
+            spellings.extend([("comment.open", comment.open.as_str()), ("comment.close", &comment.close)]);
+            if comment.open.is_empty() || comment.open.len() + comment.close.len() > 16 {
+                return Err(refuse("comment.open", "a comment needs a short mark to begin with".into()));
+            }
+        }
+        for (key, text) in spellings {
+            self.check_line(text.as_bytes()).map_err(|message| refuse(key, message))?;
+            self.check_words(text).map_err(|message| refuse(key, message))?;
+        }
+        for key in &self.unconfirmed {
+            if !KEYS.contains(&key.split('.').next().unwrap_or_default()) {
+                return Err(source.unknown_value("unconfirmed", key, &KEYS).into());
+            }
+        }
+        Ok(())
     }
 
     fn check_words(&self, line: &str) -> Result<(), String> {
@@ -313,92 +356,5 @@ impl Dialect {
             ("arrived", &self.block.arrived),
             ("end", &self.block.end),
         ]
-    }
-
-    fn trials(&self) -> Vec<Facts> {
-        let plain = Facts {
-            wcs: self.wcs.first().cloned().unwrap_or_default(),
-            clearance: "500".into(),
-            first: ["1".into(), "2".into(), "500".into()],
-            rpm: 20_000,
-            spin_up_ms: 3000,
-            rapid_xy: "30".into(),
-            rapid_z: "15".into(),
-            tool_number: 1,
-            ..Facts::default()
-        };
-        vec![
-            Facts { code: Some(8), ..plain.clone() },
-            Facts { by_hand: true, ..plain.clone() },
-            Facts { tool_changer: true, ..plain.clone() },
-            plain,
-        ]
-    }
-}
-
-/// How many last decimals one unit of the grid is; None if it is no whole number of them.
-pub(super) fn decimal_steps(word: &Number, unit_mm: f64) -> Option<i64> {
-    match word.unit {
-        LengthUnit::Grid => Some(1),
-        LengthUnit::Mm => {
-            let steps = unit_mm * 10f64.powi(word.decimals as i32);
-            // unit_mm is a decimal number read into binary: 0.0001 * 1e4 is 1 but for the last bit.
-            let whole = steps.round();
-            (whole >= 1.0 && (steps - whole).abs() < 1e-9 * whole).then_some(whole as i64)
-        }
-    }
-}
-
-/// `count` last decimals, exactly: 1500 with three decimals is 1.5.
-pub(super) fn number(count: i64, decimals: u32, point: Point) -> String {
-    let mut bytes = Vec::new();
-    push_number(&mut bytes, count, decimals, point);
-    bytes.into_iter().map(char::from).collect()
-}
-
-/// As [`number`], at the end of a line.
-pub(super) fn push_number(line: &mut Vec<u8>, count: i64, decimals: u32, point: Point) {
-    let mut digits = [b'0'; 32];
-    let mut rest = count.unsigned_abs();
-    let mut start = digits.len();
-    while rest > 0 {
-        start -= 1;
-        digits[start] = b'0' + (rest % 10) as u8;
-        rest /= 10;
-    }
-    if count < 0 {
-        line.push(b'-');
-    }
-    let split = digits.len() - decimals as usize;
-    line.extend_from_slice(if start < split { &digits[start..split] } else { b"0" });
-    let zeros = digits[split..].iter().rev().take_while(|&&b| b == b'0').count();
-    let fraction = &digits[split..digits.len() - zeros];
-    if !fraction.is_empty() {
-        line.push(b'.');
-        line.extend_from_slice(fraction);
-    } else if point == Point::Always {
-        line.extend_from_slice(if decimals > 0 { b".0" } else { b"." });
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_spelled_from_whole_counts() {
-        let cases = [
-            (0, 4, Point::Fraction, "0"),
-            (-1, 4, Point::Fraction, "-0.0001"),
-            (15_000, 4, Point::Fraction, "1.5"),
-            (-123_456_789, 4, Point::Fraction, "-12345.6789"),
-            (30, 1, Point::Always, "3.0"),
-            (53, 1, Point::Always, "5.3"),
-            (8, 0, Point::Always, "8."),
-            (-2_147_483_648, 0, Point::Fraction, "-2147483648"),
-        ];
-        for (count, decimals, point, text) in cases {
-            assert_eq!(number(count, decimals, point), text);
-        }
     }
 }

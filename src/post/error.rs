@@ -18,6 +18,8 @@ pub enum Error {
         "{path}:{line}: block \"{block}\": {message}; hint: see the blocks of the dialects that come with screenmill"
     )]
     Block { path: String, line: usize, block: &'static str, message: String },
+    #[error("{path}:{line}: {key}: {message}; hint: it is written into programs as it stands")]
+    Spelling { path: String, line: usize, key: String, message: String },
     #[error(
         "the program for {dialect} cannot be written: {message}; hint: check the [limits] and [block] of the dialect"
     )]
@@ -52,6 +54,10 @@ pub enum Error {
         "spin_up_s of {machine} is {spin_up_s}, {dialect} can wait {limit_s} s at most; hint: lower it and warm the spindle up by hand"
     )]
     Dwell { machine: String, spin_up_s: f64, dialect: String, limit_s: f64 },
+    #[error(
+        "a program of {bytes} bytes does not go into the memory of {machine}, {memory_bytes} bytes; hint: smaller tiles, or pattern = \"one-way\", which can be cut in sections at every pass"
+    )]
+    Memory { bytes: u64, machine: String, memory_bytes: u64 },
     #[error("wcs \"{wcs}\" is not one of {dialect}; hint: {hint}")]
     Wcs { wcs: String, dialect: String, hint: String },
     #[error("the program could not be written: {0}")]

@@ -2,21 +2,54 @@ use super::dialect::{Comment, Dialect};
 use super::{Program, ZZero};
 use crate::machine::{Bounds, Machine};
 
-/// The lines of the header, without line endings; none for a dialect without comments.
-pub(super) fn lines(
+/// Room for a time of up to some thousand hours.
+const TIME_WIDTH: usize = 20;
+
+/// What the operator reads above a program, and where its time can be filled in later: only the text
+/// read back says how long it runs.
+#[derive(Default)]
+pub(super) struct Header {
+    pub lines: Vec<String>,
+    /// Line, and byte in it, of [`TIME_WIDTH`] bytes.
+    pub time_at: Option<(usize, usize)>,
+}
+
+/// The text of a time, as wide as the room for it.
+pub(super) fn time(comment: &Comment, dialect: &Dialect, seconds: Option<f64>) -> String {
+    let text = match seconds {
+        None => "not estimated".into(),
+        Some(seconds) => {
+            let whole = seconds.max(0.0).round() as u64;
+            format!("{} h {:02} min {:02} s", whole / 3600, whole / 60 % 60, whole % 60)
+        }
+    };
+    comment.clean(&format!("{text:>TIME_WIDTH$}"), &dialect.limits)
+}
+
+/// The header, without line endings; nothing for a dialect without comments.
+pub(super) fn header(
     program: &Program,
     dialect: &Dialect,
     machine: &Machine,
     bounds: &Bounds,
     sha256: &str,
-) -> Vec<String> {
-    let Some(comment) = &dialect.comment else { return Vec::new() };
+) -> Header {
+    let Some(comment) = &dialect.comment else { return Header::default() };
     let mut lines = Vec::new();
+    let mut time_at = None;
     for (label, text) in facts(program, dialect, machine, bounds, sha256) {
-        wrap(&mut lines, comment, dialect, &format!("{label}: {text}"));
+        if label == TIME {
+            time_at = Some((lines.len(), comment.open.len() + label.len() + comment.label.len()));
+            let text = time(comment, dialect, None);
+            lines.push(comment.line(&format!("{label}{}{text}", comment.label), &dialect.limits));
+            continue;
+        }
+        wrap(&mut lines, comment, dialect, &format!("{label}{}{text}", comment.label));
     }
-    lines
+    Header { lines, time_at }
 }
+
+const TIME: &str = "estimated time";
 
 fn facts(
     program: &Program,
@@ -35,6 +68,16 @@ fn facts(
         ("tile", program.tile.into()),
         ("operation", program.operation.into()),
     ];
+    if let Some(section) = program.section {
+        let cutter = if section.index == 1 {
+            ""
+        } else if section.fresh_cutter {
+            ", fit a fresh cutter and set Z0 again"
+        } else {
+            ", goes on with the same cutter"
+        };
+        facts.push(("section", format!("{} of {}{cutter}", section.index, section.count)));
+    }
     let number = tool.number.map_or(String::new(), |n| format!("T{n} "));
     let flutes = tool.flutes.map_or(String::new(), |n| format!(", {n} flutes"));
     facts.push(("tool", format!("{number}{}, {}{flutes}", tool.name, shape(&tool.shape))));
@@ -72,6 +115,16 @@ fn facts(
         tool.feed_mm_min, tool.plunge_mm_min, tool.spindle_rpm
     );
     facts.push(("feed", feeds));
+    if let (Some(coolant), None) = (&machine.coolant, dialect.coolant(machine)) {
+        facts.push(("coolant", format!("{} is not known to the controller, switch it by hand", coolant.on)));
+    }
+    facts.push((TIME, String::new()));
+    let z_zero = if machine.tool_changer {
+        "the tool's length offset has to be measured, X0 Y0 stay as they are"
+    } else {
+        "set Z0 again whenever a tool has been fitted, leave X0 Y0 as they are"
+    };
+    facts.push(("z", z_zero.into()));
     let unconfirmed = machine.unconfirmed();
     if !unconfirmed.is_empty() {
         facts.push(("verify against your machine", unconfirmed.join(", ")));
@@ -107,10 +160,7 @@ fn short(value_mm: f64) -> String {
 
 /// Text as comment lines that the controller can take, broken between words where there are any.
 fn wrap(lines: &mut Vec<String>, comment: &Comment, dialect: &Dialect, text: &str) {
-    let bad = |c: char| {
-        !(' '..='~').contains(&c) || comment.forbidden.contains(c) || dialect.limits.forbidden.contains(c)
-    };
-    let text: String = text.chars().map(|c| if bad(c) { '_' } else { c }).collect();
+    let text = comment.clean(text, &dialect.limits);
     let room = dialect.limits.line_max - comment.open.len() - comment.close.len() - CONTINUED.len();
     let mut rest = text.trim_end();
     let mut prefix = "";

@@ -1,9 +1,12 @@
 //! From a toolpath to the text of a program, by the word tables of posts/.
 
+mod block;
 mod dialect;
 mod error;
 mod header;
+mod number;
 mod program;
+mod sections;
 mod writer;
 
 pub use dialect::{
@@ -11,5 +14,6 @@ pub use dialect::{
     When, Words,
 };
 pub use error::Error;
-pub use program::{Program, StockFacts, ZZero};
-pub use writer::{Written, write};
+pub use program::{Program, Section, StockFacts, ZZero};
+pub use sections::{Piece, sections};
+pub use writer::{Written, stamp_time, write};

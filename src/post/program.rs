@@ -20,6 +20,16 @@ pub struct StockFacts {
     pub top_allowance_mm: f64,
 }
 
+/// Which of several programs that cut one operation after each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Section {
+    /// From 1.
+    pub index: u32,
+    pub count: u32,
+    /// Whether it begins with a cutter that has not cut yet.
+    pub fresh_cutter: bool,
+}
+
 /// One operation of one tile with all that its text says. Lengths are in the program's frame.
 #[derive(Clone, Debug)]
 pub struct Program<'a> {
@@ -27,6 +37,10 @@ pub struct Program<'a> {
     pub part: &'a str,
     pub tile: &'a str,
     pub operation: &'a str,
+    /// Among the programs of its tile, from 1; controllers that number programs are told it.
+    pub number: u32,
+    /// None where the operation is one program.
+    pub section: Option<Section>,
     /// Its feeds and speed are those of the program.
     pub tool: &'a Tool,
     pub stock: &'a StockFacts,

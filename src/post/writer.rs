@@ -1,8 +1,10 @@
-use std::io::Write;
+use std::io::{Seek, SeekFrom, Write};
 
 use sha2::{Digest, Sha256};
 
-use super::dialect::{self, Dialect, Facts, FeedUnit, Number, Place, When};
+use super::block::Facts;
+use super::dialect::{Dialect, FeedUnit, Number, Place, When};
+use super::number;
 use super::{Error, Program, header};
 use crate::catalogue;
 use crate::machine::{Bounds, Machine, SpindleSetting};
@@ -15,6 +17,8 @@ pub struct Written {
     pub lines: u64,
     /// Of everything after the header; of everything where there is none. In hexadecimal.
     pub sha256: String,
+    /// Byte at which [`stamp_time`] fills the header's time in; None where there is no header.
+    pub time_at: Option<u64>,
     /// Of the toolpath's moves, in the program's frame.
     pub bounds: Bounds,
     pub spindle: SpindleSetting,
@@ -37,19 +41,71 @@ pub fn write(
     plan.body(&mut dry)?;
     dry.flush()?;
     let sha256: String = dry.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    let header = header::lines(program, dialect, machine, &plan.bounds, &sha256);
-    for line in &header {
+    let header = header::header(program, dialect, machine, &plan.bounds, &sha256);
+    for line in &header.lines {
         dialect.check_line(line.as_bytes()).map_err(|message| plan.line_error(message))?;
+    }
+    lead.flush()?;
+    let ending = dialect.line_ending.bytes().len() as u64;
+    let above: u64 = header.lines.iter().map(|line| line.len() as u64 + ending).sum();
+    let (bytes, most) = (lead.bytes + above + dry.bytes, machine.transfer.memory_bytes);
+    if let Some(memory_bytes) = most.filter(|most| bytes > *most) {
+        return Err(Error::Memory { bytes, machine: machine.name.clone(), memory_bytes });
     }
     let mut sink = Sink::new(Some(out), dialect);
     plan.block(&dialect.block.lead, &mut sink)?;
-    for line in &header {
+    let mut time_at = None;
+    for (index, line) in header.lines.iter().enumerate() {
+        if let Some((_, byte)) = header.time_at.filter(|at| at.0 == index) {
+            time_at = Some(sink.bytes + (sink.buffer.len() + byte) as u64);
+        }
         sink.line.extend_from_slice(line.as_bytes());
         sink.end_line(&plan)?;
     }
     plan.body(&mut sink)?;
     sink.flush()?;
-    Ok(Written { bytes: sink.bytes, lines: sink.lines, sha256, bounds: plan.bounds, spindle: plan.spindle })
+    let Sink { bytes, lines, .. } = sink;
+    Ok(Written { bytes, lines, sha256, time_at, bounds: plan.bounds, spindle: plan.spindle })
+}
+
+/// Fills the time that a program takes into its header.
+pub fn stamp_time<W: Write + Seek>(
+    file: &mut W,
+    written: &Written,
+    dialect: &Dialect,
+    seconds: f64,
+) -> Result<(), Error> {
+    if let (Some(at), Some(comment)) = (written.time_at, &dialect.comment) {
+        file.seek(SeekFrom::Start(at))?;
+        file.write_all(header::time(comment, dialect, Some(seconds)).as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Bytes of each pass of a program, from one pass start to the next, and of all around them.
+pub(super) fn pass_bytes(
+    program: &Program,
+    dialect: &Dialect,
+    machine: &Machine,
+) -> Result<(Vec<u64>, u64), Error> {
+    let plan = Plan::new(program, dialect, machine)?;
+    let mut sink = Sink::new(None, dialect);
+    let mut starts = Vec::with_capacity(program.path.pass_starts.len());
+    plan.moves(&mut sink, &mut |at| starts.push(at))?;
+    sink.flush()?;
+    let passes = starts.windows(2).map(|pair| pair[1] - pair[0]);
+    let passes: Vec<u64> = passes.chain(starts.last().map(|last| sink.bytes - last)).collect();
+    let mut around = Sink::new(None, dialect);
+    plan.block(&dialect.block.lead, &mut around)?;
+    plan.block(&dialect.block.start, &mut around)?;
+    plan.block(&dialect.block.arrived, &mut around)?;
+    plan.block(&dialect.block.end, &mut around)?;
+    for line in header::header(program, dialect, machine, &plan.bounds, &"0".repeat(64)).lines {
+        around.line.extend_from_slice(line.as_bytes());
+        around.end_line(&plan)?;
+    }
+    around.flush()?;
+    Ok((passes, around.bytes))
 }
 
 /// A program that has passed all checks.
@@ -108,7 +164,7 @@ impl<'a> Plan<'a> {
         let word = &dialect.word;
         let mut steps = [1; 3];
         for (step, number) in steps.iter_mut().zip([&word.x, &word.y, &word.z]) {
-            *step = dialect::decimal_steps(number, unit_mm).ok_or(Error::Grid {
+            *step = number::decimal_steps(number, unit_mm).ok_or(Error::Grid {
                 unit_mm,
                 dialect: dialect.name.clone(),
                 dialect_unit_mm: unit_mm,
@@ -136,12 +192,14 @@ impl<'a> Plan<'a> {
             plan.push_coordinate(&mut text, axis, value);
             String::from_utf8_lossy(&text).into_owned()
         };
-        let spell = |count: i64| dialect::number(count, word.feed.decimals, word.feed.point);
+        let grid = |mm: f64| (mm / unit_mm).round() as i32;
+        let spell = |count: i64| number::number(count, word.feed.decimals, word.feed.point);
         plan.facts = Facts {
             wcs: program.wcs.into(),
             clearance: coordinate(2, clearance),
             first: [coordinate(0, first[0]), coordinate(1, first[1]), coordinate(2, first[2])],
-            rpm: spindle.rpm.round() as i64,
+            park: [coordinate(0, grid(bounds.low_mm[0])), coordinate(1, grid(bounds.high_mm[1]))],
+            rpm: tool.spindle_rpm.round() as i64,
             code: spindle.code,
             by_hand: spindle.by_hand,
             spin_up_ms: (machine.spindle.spin_up_s * 1000.0).round() as i64,
@@ -149,6 +207,8 @@ impl<'a> Plan<'a> {
             rapid_z: spell(rapid_z),
             tool_changer: machine.tool_changer,
             tool_number: tool.number.unwrap_or(1),
+            coolant: dialect.coolant(machine),
+            program_number: program.number,
         };
         Ok(plan)
     }
@@ -160,7 +220,7 @@ impl<'a> Plan<'a> {
 
     fn push_coordinate(&self, line: &mut Vec<u8>, axis: usize, value: i32) {
         let word = self.number(axis);
-        dialect::push_number(line, i64::from(value) * self.steps[axis], word.decimals, word.point);
+        number::push_number(line, i64::from(value) * self.steps[axis], word.decimals, word.point);
     }
 
     fn line_error(&self, message: String) -> Error {
@@ -168,7 +228,7 @@ impl<'a> Plan<'a> {
     }
 
     fn block(&self, template: &str, sink: &mut Sink) -> Result<(), Error> {
-        let lines = self.dialect.spell(template, &self.facts).map_err(|message| self.line_error(message))?;
+        let lines = self.facts.spell(template, self.dialect).map_err(|message| self.line_error(message))?;
         for line in lines {
             sink.line.extend_from_slice(line.as_bytes());
             sink.end_line(self)?;
@@ -177,20 +237,43 @@ impl<'a> Plan<'a> {
     }
 
     fn body(&self, sink: &mut Sink) -> Result<(), Error> {
-        let moves = &self.program.path.moves;
-        let mut modal = Modal::default();
         self.block(&self.dialect.block.start, sink)?;
-        self.motion(&moves[0], &mut modal, sink)?;
-        self.block(&self.dialect.block.arrived, sink)?;
-        for one in &moves[1..] {
-            self.motion(one, &mut modal, sink)?;
+        self.moves(sink, &mut |_| ())?;
+        if let (Some(section), Some(comment)) = (self.program.section, &self.dialect.comment) {
+            let text = format!("section {} of {} ends here", section.index, section.count);
+            sink.line.extend_from_slice(comment.line(&text, &self.dialect.limits).as_bytes());
+            sink.end_line(self)?;
         }
-        let last = moves[moves.len() - 1].to;
+        self.block(&self.dialect.block.end, sink)
+    }
+
+    /// The motions with a mark at each pass start; `passed` is told the byte of each.
+    fn moves(&self, sink: &mut Sink, passed: &mut dyn FnMut(u64)) -> Result<(), Error> {
+        let path = self.program.path;
+        let mut modal = Modal::default();
+        let mut starts = path.pass_starts.iter().peekable();
+        let mut pass = 0;
+        for (index, one) in path.moves.iter().enumerate() {
+            if starts.next_if(|start| **start == index).is_some() {
+                passed(sink.bytes + sink.buffer.len() as u64);
+                pass += 1;
+                if let Some(comment) = &self.dialect.comment {
+                    let mark = comment.line(&format!("pass {pass}"), &self.dialect.limits);
+                    sink.line.extend_from_slice(mark.as_bytes());
+                    sink.end_line(self)?;
+                }
+            }
+            self.motion(one, &mut modal, sink)?;
+            if index == 0 {
+                self.block(&self.dialect.block.arrived, sink)?;
+            }
+        }
+        let last = path.moves[path.moves.len() - 1].to;
         if last[2] < self.clearance {
             let lift = Move { kind: Kind::Rapid, to: [last[0], last[1], self.clearance] };
             self.motion(&lift, &mut modal, sink)?;
         }
-        self.block(&self.dialect.block.end, sink)
+        Ok(())
     }
 
     fn motion(&self, one: &Move, modal: &mut Modal, sink: &mut Sink) -> Result<(), Error> {
@@ -242,7 +325,7 @@ impl<'a> Plan<'a> {
     fn push_feed(&self, line: &mut Vec<u8>, count: i64) {
         let word = &self.dialect.word.feed;
         line.extend_from_slice(word.letter.as_bytes());
-        dialect::push_number(line, count, word.decimals, word.point);
+        number::push_number(line, count, word.decimals, word.point);
     }
 }
 

@@ -18,6 +18,8 @@ pub struct SetupSheet {
     pub warnings: Vec<String>,
     /// Values no source confirms; each is marked "verify against your machine".
     pub unconfirmed: Vec<String>,
+    /// What machine and controller ask of the operator.
+    pub machine_notes: Vec<String>,
     /// How to stop the machine and what to do then.
     pub abort: Vec<String>,
     pub safety: Vec<String>,

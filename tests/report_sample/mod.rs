@@ -181,6 +181,7 @@ pub fn setup_sheet() -> SetupSheet {
         made_by: "screenmill 0.1.0".to_string(),
         warnings: words("95 % of the normals are within 3.70 degrees, the limit is 3.00"),
         unconfirmed: words("acceleration 500 mm/s2: verify against your machine"),
+        machine_notes: words("Set XY home and Z0 on the panel."),
         abort: words("Press the emergency stop; from the computer send ESC.K, then raise Z."),
         safety: words("Covers closed, eye protection; 43 h unattended need a fire watch."),
         tiles: vec![SheetTile {

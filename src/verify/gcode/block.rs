@@ -165,7 +165,7 @@ impl Block {
                 self.codes[group as usize] = Some((code as u16, column));
             }
             b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K' | b'R' | b'F' | b'S' | b'T' | b'N' | b'O' | b'P'
-            | b'Q' | b'H' | b'L' => {
+            | b'Q' | b'H' | b'L' | b'E' => {
                 let index = (letter - b'A') as usize;
                 if self.has(letter) {
                     return Err(Error::Repeated { at, letter: letter as char });
@@ -259,7 +259,7 @@ fn g_group(code: u16, at: Place) -> Result<Option<Group>, Error> {
         430 | 490 => Group::LengthOffset,
         980 | 990 => Group::Return,
         540 | 550 | 560 | 570 | 580 | 590 | 591 | 592 | 593 => Group::Offset,
-        610 | 611 | 640 => Group::PathMode,
+        610 | 611 | 640 | 1870 => Group::PathMode,
         930 => return unread("G93", "inverse time feed", "write feeds in mm/min (G94)"),
         950 => return unread("G95", "feed per revolution", "write feeds in mm/min (G94)"),
         410 | 411 => {

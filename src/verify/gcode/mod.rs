@@ -1,7 +1,7 @@
 //! An interpreter of RS274/NGC as small mills run it, for programs of any origin.
 //!
 //! Read: G0 G1 G2 G3 (with G17 G18 G19, I J K relative or absolute, R, helices, turns by P), G4, G20 G21,
-//! G28 G30, G40, G43 G49, G53 with G0, G54-G59.3, G61 G61.1 G64, G80, G90 G91, G90.1 G91.1, G94, G98
+//! G28 G30, G40, G43 G49, G53 with G0, G54-G59.3, G61 G61.1 G64 G187, G80, G90 G91, G90.1 G91.1, G94, G98
 //! G99, M0-M9, M12 M13, M30, M48 M49, M60, F H N O S T, comments, `%`. Everything else is refused: a
 //! judge that skips a word has judged another program.
 
@@ -194,6 +194,12 @@ impl Modal {
             let mode = match code {
                 610 => PathMode::Exact,
                 611 => PathMode::Stop,
+                1870 => {
+                    // Haas: P names a smoothness, E the largest rounding of a corner.
+                    block.take(b'P');
+                    let tolerance_mm = block.take(b'E').map(|e| e * self.unit_mm).filter(|e| *e > 0.0);
+                    PathMode::Blend { tolerance_mm, merge_mm: None }
+                }
                 _ => {
                     // P0 is what no P is: LinuxCNC then rounds without bound.
                     let tolerance_mm = block.take(b'P').map(|p| p * self.unit_mm).filter(|p| *p > 0.0);

@@ -10,14 +10,18 @@
 (units: mm, mm/min)
 (bounds: X -0.5 to 2, Y 0 to 0.5, Z -0.012 to 5)
 (feed: 320 mm/min, plunge 80 mm/min, 20000 rpm)
-(verify against your machine: travel, rate, motion, spindle)
+(estimated time:        not estimated)
+(z: set Z0 again whenever a tool has been fitted, leave X0 Y0 as they are)
+(verify against your machine: travel, rate, motion, spindle, coolant)
 (note: touch off Z anew after every tool, X and Y never)
 (sha256 of all lines below:)
-(- 145ecf8d301322896a4545041208ee1b5be3203fd08ca9e05e5d4f55608f5e8d)
+(- bb303731308534ae72b77fbc35185c3923703a5a022da8f49fc07e8974b5aaa1)
 G17 G21 G40 G54 G90 G94
 G0 Z5
 M3 S20000
+M8
 G4 P3
+(pass 1)
 G0 X-0.5 Y0.25 Z5
 Z0.5
 G1 Z-0.012 F80
@@ -27,9 +31,12 @@ Y0.5
 Z-0.009 F80
 X0 F320
 G0 Z5
+(pass 2)
 Y0
 G1 Z-0.001 F80
 X0.001 Y0.001 Z0 F320
 G0 Z5
 M5
+M9
+G0 X-0.5 Y0.5
 M2
