@@ -242,6 +242,13 @@ fn pages_hold_verdict_findings_programs_and_escape_what_they_are_given() {
         "verify against your machine",
         "ESC.K",
         "206.00",
+        "2.90 × 12.0 mm",
+        "3.175 mm",
+        "change after 300 m",
+        "sha256 abab",
+        "4 mm outside the tile",
+        "tilt by up to 0.57 degrees",
+        "43 h 14 min",
     ] {
         assert!(sheet.contains(part), "{part}");
     }

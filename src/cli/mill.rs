@@ -9,13 +9,14 @@ use super::staging::Staging;
 use super::{Common, Outcome, Refusal};
 
 /// What a job writes, and so what it replaces.
-const OUTPUTS: [&str; 9] = [
+const OUTPUTS: [&str; 10] = [
     "programs",
     "rejected",
     "maps",
     "report.json",
     "report.html",
     "setup-sheet.html",
+    "screen-map.svg",
     "run.json",
     "cavities.csv",
     "cavities.geojson",

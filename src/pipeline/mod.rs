@@ -22,6 +22,7 @@ mod press;
 mod relit;
 mod report;
 mod rescue;
+mod sheet;
 mod shop;
 
 pub use check::{Checked, Reach, check};

@@ -234,6 +234,13 @@ impl Part {
         Ok(Arc::new(piece))
     }
 
+    /// Width and height of the whole screen, and this part's lower left corner on it; None for what is no screen.
+    pub fn on_screen_mm(&self) -> Option<([f64; 2], [f64; 2])> {
+        let (scene, design) = (self.scene.as_ref()?, self.design.as_ref()?);
+        let corner = [design.core.c0, design.core.r0].map(|cell| f64::from(cell) * design.cell_mm);
+        Some(([scene.width_m * 1e3, scene.height_m * 1e3], corner))
+    }
+
     /// Where a tile stands in front of its audience; None for what is no screen, and for dies, which reflect nothing.
     pub fn pose(&self, job: &Job, tile: &TileSurface) -> Option<Pose> {
         let (scene, design) = (self.scene.as_ref()?, self.design.as_ref()?);

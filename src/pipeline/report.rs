@@ -71,7 +71,7 @@ pub fn finish(
     cavity_list::write_geojson(&staging.join("cavities.geojson"), &cavities)?;
     report::write_json(&staging.join("report.json"), &report)?;
     let simulate: Vec<String> = results.iter().map(|result| simulate(shop, result)).collect();
-    pages::write(job, shop, &report, &results, &simulate, staging)?;
+    pages::write(job, shop, part, &report, &results, &simulate, staging)?;
     Ok(Milled { report, simulate })
 }
 

@@ -13,6 +13,7 @@ mod palette;
 pub mod picture;
 mod scale;
 pub mod schema;
+pub mod screen_map;
 pub mod setup_sheet;
 mod template;
 

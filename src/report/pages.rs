@@ -17,6 +17,8 @@ pub struct Page<'a> {
     pub subtitle: String,
     pub report: &'a Report,
     pub limits: Limits,
+    /// The picture of all tiles, where there are several.
+    pub screen_map: Option<String>,
     pub pictures: Vec<Picture>,
     /// The largest cavities; about 20 read well.
     pub cavities: Vec<CavityRow>,
@@ -200,6 +202,7 @@ pub fn write_report(path: &Path, page: &Page) -> Result<(), Error> {
         by_tool: bars(&report.time_s.by_tool),
         gouge_limit_mm: page.limits.gouge_mm,
         gouge_budget_sum_mm: report.fidelity.as_ref().map(|fidelity| fidelity.gouge_budget_mm.total_mm()),
+        screen_map: page.screen_map.as_deref(),
         pictures: &page.pictures,
         cavities: &page.cavities,
         cavities_listed: page.cavities_listed,
@@ -221,6 +224,7 @@ struct Filled<'a> {
     by_tool: Vec<Bar>,
     gouge_limit_mm: Option<f64>,
     gouge_budget_sum_mm: Option<f64>,
+    screen_map: Option<&'a str>,
     pictures: &'a [Picture],
     cavities: &'a [CavityRow],
     cavities_listed: u64,

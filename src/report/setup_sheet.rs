@@ -46,13 +46,21 @@ pub struct SheetTile {
     pub wcs: String,
     pub xy_zero: String,
     pub z_zero: String,
+    /// Where Z0 is found again once the tile's own top is cut away.
+    pub re_zero: String,
+    /// What holds the blank, on which sides.
+    pub clamped: String,
     /// Mounting wedge about x and about y; zero without levelling.
     pub wedge_deg: [f64; 2],
     pub tools: Vec<SheetTool>,
-    /// In run order.
+    /// In run order, post after post.
     pub programs: Vec<SheetProgram>,
+    /// Of the first post's programs.
+    pub time_s: f64,
     /// What to measure, and when.
     pub checks: Vec<String>,
+    /// What the cut cannot do better, in numbers.
+    pub limits: Vec<String>,
     pub notes: Vec<String>,
 }
 
@@ -62,6 +70,11 @@ pub struct SheetTool {
     pub name: String,
     pub cutter: String,
     pub flutes: Option<u32>,
+    /// Diameter and length of what may go down beside the metal.
+    pub neck_mm: Option<[f64; 2]>,
+    /// The collet's size.
+    pub shank_mm: Option<f64>,
+    pub tool_life_m: Option<f64>,
     pub stick_out_mm: Option<f64>,
     pub spindle_rpm: f64,
     /// The machine's own code of this speed, e.g. `!RC12`.
@@ -73,11 +86,15 @@ pub struct SheetTool {
 #[derive(Clone, Debug, Serialize)]
 pub struct SheetProgram {
     pub file: String,
+    /// Set where the programs of another post begin.
+    pub begins_post: Option<String>,
     pub operation: String,
     pub tool_number: u32,
     pub tool: String,
     pub time_s: f64,
     pub bounds_mm: Bounds,
+    /// Of the whole file, in hexadecimal.
+    pub sha256: String,
     /// Set where the tool differs from the program before.
     pub re_zero_z: bool,
 }

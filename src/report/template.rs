@@ -13,6 +13,7 @@ use super::{Error, format, write_whole};
 pub enum Template {
     Report,
     SetupSheet,
+    ScreenMap,
 }
 
 impl Template {
@@ -20,6 +21,7 @@ impl Template {
         match self {
             Template::Report => ("report.html", include_str!("templates/report.html")),
             Template::SetupSheet => ("setup-sheet.html", include_str!("templates/setup-sheet.html")),
+            Template::ScreenMap => ("screen-map.svg", include_str!("templates/screen-map.svg")),
         }
     }
 }

@@ -133,6 +133,7 @@ pub fn page(report: &Report) -> Page<'_> {
             on_audience_min: Some(0.95),
             hours_max: Some(48.0),
         },
+        screen_map: None,
         pictures: ["design", "machined", "deviation", "cavity"].map(picture).to_vec(),
         cavities: vec![CavityRow {
             tile: "r0c0".to_string(),
@@ -158,7 +159,10 @@ pub fn setup_sheet() -> SetupSheet {
         name: name.to_string(),
         cutter: cutter.to_string(),
         flutes: Some(2),
-        stick_out_mm: Some(12.0),
+        neck_mm: Some([2.9, 12.0]),
+        shank_mm: Some(3.175),
+        tool_life_m: Some(300.0),
+        stick_out_mm: Some(22.0),
         spindle_rpm: 20_000.0,
         spindle_code: Some("!RC15".to_string()),
         feed_mm_min,
@@ -166,11 +170,13 @@ pub fn setup_sheet() -> SetupSheet {
     };
     let program = |file: &str, operation: &str, tool_number: u32, tool: &str, time_s: f64| SheetProgram {
         file: file.to_string(),
+        begins_post: None,
         operation: operation.to_string(),
         tool_number,
         tool: tool.to_string(),
         time_s,
         bounds_mm: bounds(),
+        sha256: "ab".repeat(32),
         re_zero_z: true,
     };
     let words = |line: &str| vec![line.to_string()];
@@ -197,15 +203,19 @@ pub fn setup_sheet() -> SetupSheet {
             wcs: "G54".to_string(),
             xy_zero: "lower left corner of the tile, 3 mm inside the blank's edges".to_string(),
             z_zero: "top of the blank, by paper 0.1 mm".to_string(),
+            re_zero: "On the rim that stays, 4 mm outside the tile.".to_string(),
+            clamped: "on the left and the right side".to_string(),
             wedge_deg: [0.125, -0.75],
             tools: vec![tool(1, "flat-3", "flat:3", 600.0), tool(2, "ball-1", "ball:1", 320.0)],
             programs: vec![
                 program("programs/r0c0-01-rough-flat-3.ngc", "rough", 1, "flat-3", 5321.0),
                 program("programs/r0c0-02-finish-ball-1.ngc", "finish", 2, "ball-1", 150_330.0),
             ],
+            time_s: 155_651.0,
             checks: words(
                 "after roughing: depth at the centre 0.57 mm below the blank's top, within 0.05 mm",
             ),
+            limits: words("heights are rounded to 0.01 mm: a facet 1 mm long may tilt by up to 0.57 degrees"),
             notes: words("deburr the rim only; polish along y"),
         }],
     }
