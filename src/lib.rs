@@ -41,6 +41,8 @@ pub mod verify;
 
 pub mod fidelity;
 
+pub mod evaluation;
+
 pub mod report;
 
 pub mod job;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom; a room imports from rooms above it only.
-const ORDER: [&str; 19] = [
+const ORDER: [&str; 20] = [
     "settings",
     "catalogue",
     "progress",
@@ -20,6 +20,7 @@ const ORDER: [&str; 19] = [
     "post",
     "verify",
     "fidelity",
+    "evaluation",
     "report",
     "job",
     "pipeline",

@@ -1,4 +1,4 @@
-//! `screenmill design`, `limits` and `calibrate` as sentences.
+//! `screenmill design`, `limits`, `calibrate` and `evaluate` as sentences.
 
 use std::fs;
 use std::path::Path;
@@ -212,4 +212,38 @@ fn a_mask_that_makes_no_sense_is_refused() {
     refuse(&["--out", out, "--frustum", "nan", "0", "1", "1"], "left < right");
     refuse(&["--out", out, "--gamma", "0"], "an exponent from 0.1 to 10");
     refuse(&["--out", &format!("{}/no/m.png", folder.path().display()), "--pixels", "2", "2"], "no/m");
+}
+
+#[test]
+fn an_evaluation_sets_the_papers_words_beside_the_scenes_figures() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = coarse(folder.path(), "schema", "schema");
+    let made = ["1", "2"].map(|threads| {
+        let out = folder.path().join(threads);
+        let path = out.to_str().expect("text");
+        let said =
+            screenmill(&["evaluate", &scene, "--out", path, "--threads", threads, "--json", "--quiet"])
+                .success();
+        let json: serde_json::Value =
+            serde_json::from_slice(&said.get_output().stdout).expect("one JSON object");
+        (out, json)
+    });
+    let [(out, json), (other, _)] = &made;
+    let gain = json["flat"]["gain_attenuation"].as_f64().expect("a number");
+    assert!((gain - 8.18).abs() < 0.05, "{gain}");
+    for view in json["seats"].as_array().expect("seats") {
+        let own = view["deviation"].as_f64().expect("a number");
+        assert!(own < 0.3 * view["high_gain_deviation"].as_f64().expect("a number"), "{view}");
+    }
+    let page = fs::read_to_string(out.join("evaluation.html")).expect("a page");
+    assert!(page.contains("more than 8 times") && page.contains("gain.png"));
+    let files = json["files"].as_array().expect("files");
+    assert!(files.len() > 18, "{files:?}");
+    for file in files {
+        let [one, two] =
+            [out, other].map(|out| fs::read(out.join(file.as_str().expect("text"))).expect("a file"));
+        assert!(one.len() > 500 && one == two, "{file}");
+    }
+    screenmill(&["evaluate", &sample("missing"), "--out", &format!("{}/x", folder.path().display())]).code(2);
+    assert!(!folder.path().join("x").exists());
 }

@@ -1,6 +1,7 @@
 //! Limits and light of a screen against closed forms, hand-worked cases and naive twins.
 
 use glam::{DVec2, DVec3};
+use screenmill::evaluation::{self, CellLight};
 use screenmill::optics::half_vector;
 use screenmill::screen::{self, Scene};
 
@@ -209,4 +210,107 @@ fn the_mask_is_eq_9_over_its_largest_value() {
     let same = screen::calibrate(&scene, Some(&zero)).expect("a calibration");
     near(same.mask(DVec2::new(0.31, -0.123)), calibration.mask(DVec2::new(0.31, -0.123)), 1e-12);
     near(same.figures.gain_redirection, calibration.figures.gain_redirection, 1e-9);
+}
+
+#[test]
+fn the_facets_of_a_cell_give_the_gain_of_the_solid_angle_formula() {
+    for (name, cell) in
+        [("theatre", (250_i32, 125_i32)), ("theatre", (40, 210)), ("home-theatre", (250, 125))]
+    {
+        let mut scene = sample(name);
+        scene.microgeometry.area = screen::AreaRule::Exact;
+        // The base of the cell: the mean gradient of its facets, which is steep in a corner of the screen.
+        let x = scene.centre_m(f64::from(cell.0), f64::from(cell.1), 0.0);
+        let list = screen::directions(&scene.view(x), 200).expect("an audience").list;
+        let wanted = screen::facets(&scene, x, &list).expect("facets");
+        let total: f64 = wanted.weights.iter().sum();
+        let mean = |axis: usize| -> f64 {
+            wanted.gradients.iter().zip(&wanted.weights).map(|(g, p)| g[axis] * p).sum::<f64>() / total
+        };
+        let tilt = DVec2::new(mean(0), mean(1));
+        let (column, row) = (cell.0 as usize, cell.1 as usize);
+        let light = CellLight::new(&scene, (column, row), 0.0, tilt).expect("a cell");
+        let l = screen::projected_sr(&scene.audience, x, tilt);
+        let i = (scene.projector_m - x).normalize();
+        let caught = 1.0 - tilt.dot(i.truncate()) / i.z;
+        let reflectance = scene.reflector.index.reflectance(1.0);
+        let formula = std::f64::consts::PI * reflectance * caught / l;
+        near(light.reflected() / (reflectance * caught), 1.0, 2e-3);
+        // Energy: what goes in all directions is the reflected part.
+        let (across, view) = (300, scene.view(light.point_m));
+        let spacing = 2.0 / f64::from(across);
+        let (mut all, mut inside, mut count) = (0.0, 0.0, 0.0);
+        for at in 0..across * across {
+            let place = |k: i32| (f64::from(k) + 0.5) * spacing - 1.0;
+            let (u, v) = (place(at % across), place(at / across));
+            let z2 = 1.0 - u * u - v * v;
+            if z2 <= 0.0 {
+                continue;
+            }
+            let o = DVec3::new(u, v, z2.sqrt());
+            let gain = light.gain(o);
+            all += light.intensity(o) / o.z * spacing * spacing / std::f64::consts::PI;
+            // Two spreads inside the audience's edge no light is lost to it.
+            let far = 3.0 * light.spread_rad();
+            let deep = [
+                [far, 0.0],
+                [-far, 0.0],
+                [0.0, far],
+                [0.0, -far],
+                [far, far],
+                [-far, far],
+                [far, -far],
+                [-far, -far],
+            ]
+            .iter()
+            .all(|[du, dv]| view.hit((o + DVec3::new(*du, *dv, 0.0)).normalize()));
+            if deep {
+                inside += gain;
+                count += 1.0;
+            }
+        }
+        near(all, light.reflected(), 2e-3);
+        assert!(count > 20.0, "{name}");
+        let mean = inside / count;
+        assert!((mean / formula - 1.0).abs() < 0.02, "{name} {cell:?}: {mean} {formula}");
+    }
+}
+
+#[test]
+fn high_gain_falls_to_half_at_25_degrees_off_the_mirror_direction() {
+    near(evaluation::high_gain(0.0), 2.9, 1e-12);
+    near(evaluation::high_gain(25.0), 1.45, 1e-12);
+    // A projector to the left is mirrored to the right.
+    let right = DVec3::new(1.0, 0.0, 3.0);
+    near(evaluation::high_gain_towards(DVec3::ZERO, DVec3::new(-1.0, 0.0, 3.0), right), 2.9, 1e-9);
+}
+
+#[test]
+fn what_stands_where_it_should_loses_no_light_and_more_error_loses_more() {
+    let mut scene = sample("theatre");
+    scene.microgeometry.width_mm = 20.0;
+    let grid = evaluation::Grid::over(&scene, None, 10).expect("cells");
+    let tile = evaluation::patch(&scene, None, 200.0, 4).expect("cells");
+    assert_eq!((grid.columns, grid.rows, tile.columns, tile.rows), (10, 5, 4, 4));
+    for tolerance in evaluation::misalignment(&scene, &grid, &tile) {
+        let on = &tolerance.on_audience;
+        let middle = on.len() / 2;
+        assert_eq!(tolerance.off[middle], 0.0);
+        near(on[middle], 1.0, 1e-12);
+        for k in 0..middle {
+            assert!(on[k] <= on[k + 1] + 1e-12, "{}: {on:?}", tolerance.what);
+            assert!(on[on.len() - 1 - k] <= on[on.len() - 2 - k] + 1e-12, "{}: {on:?}", tolerance.what);
+        }
+    }
+}
+
+#[test]
+fn seats_are_in_their_audience_and_the_middle_of_two_is_in_none() {
+    let [one, all] = evaluation::seats(&sample("home-theatre"));
+    assert_eq!(one.each_ref().map(|seat| seat.inside), [true; 3]);
+    assert_eq!(all.each_ref().map(|seat| seat.inside), [true, false, true]);
+    near(one[0].place_m[0], -1.25 + 0.07, 1e-9);
+    near(all[1].place_m[0], 0.0, 1e-12);
+    let section = evaluation::section(&sample("theatre").audience[0], DVec3::Z, 2.0 + 1e-9);
+    assert!(section.iter().any(|p| (p.x - 1.0).abs() < 1e-6 && (p.y + 0.65).abs() < 1e-6));
 }

@@ -7,6 +7,7 @@ mod compensate;
 mod console;
 mod design;
 mod estimate;
+mod evaluate;
 mod fixtures;
 mod light;
 mod limits;
@@ -60,6 +61,7 @@ enum Command {
     Design(design::Arguments),
     Limits(limits::Arguments),
     Calibrate(calibrate::Arguments),
+    Evaluate(evaluate::Arguments),
     Raster(raster::Arguments),
     Compensate(compensate::Arguments),
     Simulate(simulate::Arguments),
@@ -104,6 +106,7 @@ pub fn run() -> ExitCode {
         Command::Design(arguments) => design::run(arguments, common),
         Command::Limits(arguments) => limits::run(arguments, common),
         Command::Calibrate(arguments) => calibrate::run(arguments, common),
+        Command::Evaluate(arguments) => evaluate::run(arguments, common),
         Command::Raster(arguments) => raster::run(arguments, common),
         Command::Compensate(arguments) => compensate::run(arguments, common),
         Command::Simulate(arguments) => simulate::run(arguments, common),

@@ -139,8 +139,7 @@ pub fn write_map(
         legend: Legend::None,
         bar: Some(bar),
     };
-    let tall = (760.0 * size_m[1] / size_m[0]).clamp(200.0, 900.0) as u32 + 110;
-    figure::write(stem, &[figure], 1, [960, tall])
+    figure::write(stem, &[figure], 1, [960, figure::height_to_scale(960, true, size_m)])
 }
 
 /// The smallest margin in blocks of cells, at most [`MAPPED`] along a side.

@@ -23,6 +23,10 @@ const SHARPNESS: u32 = 2;
 /// Grids of more cells are not drawn as SVG, which would be megabytes of rectangles.
 const MOST_SVG_CELLS: usize = 20_000;
 const HEADER: u32 = 54;
+const LEFT: u32 = 66;
+const RIGHT: u32 = 20;
+const BOTTOM: u32 = 50;
+const BAR: u32 = 104;
 
 pub type Rgb8 = [u8; 3];
 
@@ -175,6 +179,12 @@ impl Bar {
     }
 }
 
+/// Height of a panel of this width whose axes have one scale, for spans along x and y.
+pub fn height_to_scale(width: u32, bar: bool, [across, up]: [f64; 2]) -> u32 {
+    let plot = f64::from(width) - f64::from(LEFT + RIGHT + if bar { BAR } else { 0 });
+    (plot * up / across).clamp(80.0, 1400.0).round() as u32 + HEADER + BOTTOM
+}
+
 /// Draws panels in rows of `across` to `stem`.png and, unless a grid is too fine, `stem`.svg; `size` in pixels of
 /// the SVG. Gives the names of the files, without their folder.
 pub fn write(stem: &Path, panels: &[Figure], across: usize, size: [u32; 2]) -> Result<Vec<String>, Error> {
@@ -269,16 +279,16 @@ where
     area.draw_text(&figure.title, &text(19, ink), (px(16), px(10)))?;
     area.draw_text(&figure.subtitle, &text(14, soft), (px(16), px(33)))?;
     let (width, height) = area.dim_in_pixel();
-    let bar_width = if figure.bar.is_some() { px(104) } else { 0 };
+    let bar_width = if figure.bar.is_some() { px(BAR) } else { 0 };
     let ticks_x = (width / (90 * unit)).clamp(2, 12) as usize;
     let ticks_y = (height / (60 * unit)).clamp(2, 10) as usize;
     let mut chart = ChartBuilder::on(area)
         .margin_top(px(HEADER))
-        .margin_right(px(20) + bar_width)
+        .margin_right(px(RIGHT) + bar_width)
         .margin_left(px(8))
         .margin_bottom(px(6))
-        .x_label_area_size(px(44))
-        .y_label_area_size(px(58))
+        .x_label_area_size(px(BOTTOM - 6))
+        .y_label_area_size(px(LEFT - 8))
         .build_cartesian_2d(figure.x.coordinate(ticks_x), figure.y.coordinate(ticks_y))?;
     for layer in &figure.layers {
         if let Layer::Cells { low, high, columns, colours } = layer {
@@ -294,9 +304,10 @@ where
             }))?;
         }
     }
+    let covered = figure.layers.iter().any(|layer| matches!(layer, Layer::Cells { .. }));
     let mut mesh = chart.configure_mesh();
     mesh.light_line_style(TRANSPARENT)
-        .bold_line_style(rgb(LINE.0).mix(if figure.bar.is_some() { 0.0 } else { 0.5 }))
+        .bold_line_style(rgb(LINE.0).mix(if covered { 0.0 } else { 0.5 }))
         .axis_style(rgb(SOFT_INK.0).stroke_width(unit))
         .x_desc(&figure.x.label)
         .y_desc(&figure.y.label)
@@ -362,7 +373,7 @@ where
     }
     if let Some(bar) = &figure.bar {
         let (left, right) = (width as i32 - px(100), width as i32 - px(80));
-        let (top, bottom) = (px(HEADER + 24), height as i32 - px(50));
+        let (top, bottom) = (px(HEADER + 24), height as i32 - px(BOTTOM));
         let tall = bottom - top;
         for y in 0..tall {
             let colour = bar.palette.at(1.0 - f64::from(y) / f64::from(tall - 1)).0;

@@ -2,6 +2,8 @@
 
 pub mod cavity_list;
 pub mod design_space;
+pub mod evaluation;
+mod evaluation_tables;
 pub mod figure;
 pub mod files;
 mod format;
@@ -16,6 +18,7 @@ pub mod schema;
 pub mod screen_map;
 pub mod setup_sheet;
 mod template;
+mod test_image;
 
 pub use files::{write_json, write_whole};
 pub use schema::{

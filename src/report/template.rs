@@ -11,6 +11,7 @@ use super::{Error, format, write_whole};
 
 #[derive(Clone, Copy, Debug)]
 pub enum Template {
+    Evaluation,
     Report,
     SetupSheet,
     ScreenMap,
@@ -19,6 +20,7 @@ pub enum Template {
 impl Template {
     fn source(self) -> (&'static str, &'static str) {
         match self {
+            Template::Evaluation => ("evaluation.html", include_str!("templates/evaluation.html")),
             Template::Report => ("report.html", include_str!("templates/report.html")),
             Template::SetupSheet => ("setup-sheet.html", include_str!("templates/setup-sheet.html")),
             Template::ScreenMap => ("screen-map.svg", include_str!("templates/screen-map.svg")),

@@ -22,7 +22,7 @@ mod silhouette;
 mod solid;
 
 pub use audience::{HalfSpace, Polyhedron, View};
-pub use calibration::{Calibration, Figures, calibrate, projected_sr};
+pub use calibration::{Calibration, Figures, base_gradient, calibrate, projected_sr};
 pub use container::ContainerError;
 pub use design::{Cell, CellRange, Design, Facet, FacetPolygon, Profile, Seam};
 pub use directions::{Directions, MOST_SAMPLES, directions};
