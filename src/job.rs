@@ -326,13 +326,6 @@ impl Job {
             (
                 "level = \"plane\"",
                 level,
-                part.form == Form::Part,
-                "form = \"part\"",
-                "cut the die unlevelled",
-            ),
-            (
-                "level = \"plane\"",
-                level,
                 self.stock.blanks == Blanks::PerTile || mesh,
                 "blanks = \"per-tile\"",
                 "tiles of one sheet cannot each be turned",

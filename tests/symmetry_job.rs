@@ -2,7 +2,9 @@
 
 mod job;
 
-use job::Bench;
+use glam::{DMat3, DVec3};
+use job::{Bench, STEP_MM};
+use screenmill::surface::{Options, Surface};
 
 const SIDE: usize = 400;
 
@@ -60,4 +62,76 @@ fn four_setups_of_one_sheet_cut_what_one_cuts() {
     assert!(deeper < 0.002, "four setups cut {deeper} mm deeper");
     let higher = machined.iter().copied().fold(0.0, f64::max);
     assert!(higher < 0.002, "four setups leave {higher} mm more");
+}
+
+/// Rx(about_x) Ry(about_y) of a wedge.
+fn turn(wedge_deg: [f64; 2]) -> DMat3 {
+    let [x, y] = wedge_deg.map(f64::to_radians);
+    DMat3::from_rotation_x(x) * DMat3::from_rotation_y(y)
+}
+
+fn numbers<const N: usize>(value: &serde_json::Value) -> [f64; N] {
+    std::array::from_fn(|k| value[k].as_f64().expect("a number"))
+}
+
+/// Samples of a levelled tile, pressed back by its wedge about the program's zero, lie on the tile as it was; and
+/// normals do, since one rotation takes all of it.
+#[test]
+fn a_levelled_tile_turned_back_by_its_wedge_is_the_tile() {
+    for form in ["part", "die"] {
+        let form_key = format!("step_mm = 0.02\nform = \"{form}\"");
+        let level_key = format!("{form_key}\nlevel = \"plane\"");
+        let plain = Bench::with(&[("step_mm = 0.02", &form_key)]);
+        plain.mill(0);
+        let levelled = Bench::with(&[("step_mm = 0.02", &level_key)]);
+        let tile = levelled.mill(0)["tiles"][0].clone();
+        let wedge = numbers(&tile["wedge_deg"]);
+        assert!(wedge[0].hypot(wedge[1]) > 1.0, "{form}: {wedge:?}, a test needs something to turn");
+        let back = turn(wedge).transpose();
+        let zero = DVec3::from(numbers(&tile["program_zero_mm"]));
+        let open = |bench: &Bench| {
+            screenmill::surface::open(&bench.path("out/maps/r0c0-design.tif"), &Options::at_step(STEP_MM))
+                .expect("a map")
+                .surface
+        };
+        let (source, turned) = (open(&plain), open(&levelled));
+        let map = |surface: &dyn Surface| {
+            let lattice = surface.lattice();
+            (lattice, surface.heights(lattice.window(), 0.0).expect("heights").z_mm)
+        };
+        let ((was, was_z), (is, is_z)) = (map(&*source), map(&*turned));
+        // The map's z counts from where the tile's highest point is turned back to; the program's zero is 0.2 mm over
+        // that point.
+        let top = zero.z - (back * DVec3::new(0.0, 0.0, 0.2)).z;
+        let mut apart = Vec::new();
+        for row in 0..is.rows as i64 {
+            for column in 0..is.columns as i64 {
+                let z = f64::from(is_z[row as usize * is.columns + column as usize]);
+                let tip = DVec3::new(is.x_mm(column), is.y_mm(row), z - top - 0.2);
+                let p = zero + back * tip;
+                let (u, v) = (p.x / STEP_MM - 0.5, p.y / STEP_MM - 0.5);
+                let (i, j) = (u.floor(), v.floor());
+                if z.is_nan()
+                    || i < 0.0
+                    || j < 0.0
+                    || i as usize + 1 >= was.columns
+                    || j as usize + 1 >= was.rows
+                {
+                    continue;
+                }
+                let at = |di: usize, dj: usize| {
+                    f64::from(was_z[(j as usize + dj) * was.columns + i as usize + di])
+                };
+                let (a, b) = (u - i, v - j);
+                let low = (1.0 - a) * at(0, 0) + a * at(1, 0);
+                let high = (1.0 - a) * at(0, 1) + a * at(1, 1);
+                apart.push(p.z - (1.0 - b) * low - b * high);
+            }
+        }
+        assert!(apart.len() > 30_000, "{form}: {}", apart.len());
+        apart.sort_by(f64::total_cmp);
+        let [low, middle, high] = [0.2, 0.5, 0.8].map(|part| apart[(part * apart.len() as f64) as usize]);
+        // On faces bilinear heights are exact to a float's last bits; ridges and valleys are on both sides of them.
+        assert!(low > -1e-6 && high < 1e-6, "{form}: {low} {middle} {high}");
+    }
 }

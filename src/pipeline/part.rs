@@ -79,7 +79,7 @@ impl Part {
                 };
                 if spec.level == Level::Plane {
                     let level = part.whole.levelled()?;
-                    part.wedge_deg = [level.about_x_deg, level.about_y_deg];
+                    part.wedge_deg = wedge(job, &level);
                     part.undercuts = undercuts(&level);
                     part.whole = Arc::new(level.surface);
                 }
@@ -181,12 +181,22 @@ impl Part {
                 let piece = Designed::new(Arc::clone(design), material, [x_mm, tile.y_mm], size_mm, step_mm)?;
                 let piece: Arc<dyn Surface> = if job.part.level == Level::Plane {
                     let level = piece.levelled()?;
-                    wedge_deg = [level.about_x_deg, level.about_y_deg];
+                    wedge_deg = wedge(job, &level);
                     undercut = undercuts(&level);
                     // Columns of the transpose are the rows of the rotation.
                     let back = level.rotation.map(DVec3::from_array);
                     rotation = DMat3::from_cols(back[0], back[1], back[2]);
                     shift_mm = DVec3::from_array(level.shift_mm);
+                    if die {
+                        // A die is its part turned half round Y and moved right by the width, M p + w: with the part's
+                        // p' = R p + s the die's turns by M R M, and moves by w' - M R M w + M s.
+                        let about = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0));
+                        let turned = level.surface.lattice().width_mm;
+                        rotation = about * rotation * about;
+                        shift_mm = DVec3::new(turned, 0.0, 0.0)
+                            - rotation.transpose() * DVec3::new(tile.width_mm, 0.0, 0.0)
+                            + about * shift_mm;
+                    }
                     Arc::new(level.surface)
                 } else {
                     Arc::new(piece)
@@ -253,6 +263,14 @@ impl Part {
             self.whole.top_mm() * 1e-3,
         );
         Some(Pose { origin_m: corner_m + tile.origin_mm * 1e-3, rotation: tile.rotation })
+    }
+}
+
+/// Wedge angles of what is cut: a die is its part turned half round Y, which reverses turns about X.
+fn wedge(job: &Job, level: &surface::Level) -> [f64; 2] {
+    match job.part.form {
+        Form::Part => [level.about_x_deg, level.about_y_deg],
+        Form::Die => [-level.about_x_deg, level.about_y_deg],
     }
 }
 
