@@ -14,29 +14,28 @@ const SHORTEST_ARC: f64 = 1e-6;
 /// Directions within this count as one line.
 const SAME_DIRECTION: f64 = 1e-3;
 
-/// How two segments were joined.
-pub(super) enum Joint {
-    /// As they are.
-    Plain,
-    /// By an arc between them; `keeps` tells whether anything is left of the line before it.
-    Arc { blend: Box<Segment>, keeps: bool },
+/// An arc that comes between two segments.
+pub(super) struct Between {
+    pub blend: Segment,
+    /// Whether anything is left of the line before it.
+    pub keeps: bool,
 }
 
 /// Joins a new segment to the last of the queue (tp.c: tpHandleBlendArc).
-pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) -> Joint {
+pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) -> Option<Between> {
     if before.progress > 0.5 * before.length || before.end == End::Stop {
-        return Joint::Plain;
+        return None;
     }
     let (u1, u2) = (before.last, next.first);
     if (u1 + u2).length_squared() < SHARP * SHARP {
         before.end_with(End::Stop, next);
-        return Joint::Plain;
+        return None;
     }
     // What the kink asks of the axes, at the speed of the slower, within one period of the servo loop.
     let speed = before.speed_asked().min(next.speed_asked());
     let jump = (u2 - u1).abs() * (speed / limits.period + next.acceleration) / limits.acceleration;
     let mut asks = jump.max_element();
-    if matches!(before.shape, Shape::Arc(_)) || matches!(next.shape, Shape::Arc(_)) {
+    if before.shape == Shape::Arc || next.shape == Shape::Arc {
         asks /= TANGENTIAL;
     }
     let share = asks.min(KINK_RATIO);
@@ -45,18 +44,23 @@ pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) ->
     if asks < KINK_RATIO {
         before.kink_speed = Some(speed);
         before.end_with(End::Tangent, next);
-        return Joint::Plain;
+        return None;
     }
     before.kink_speed = Some(speed * KINK_RATIO / asks);
     if before.end != End::Parabola {
-        return Joint::Plain;
+        return None;
     }
     let straight_on = speed * KINK_RATIO / asks;
     let corner = Corner::between(u1, u2);
-    let parabola = 0.5 * parabola_speed(limits, before, next, &corner);
     if let Some(arc) = RoundedCorner::fit(limits, before, next, &corner) {
         let blend = arc.segment(limits, before);
-        if blend.speed_max > parabola.max(straight_on) {
+        // What a parabola could reach at most settles most corners.
+        let cut = 2.0 * before.acceleration * before.tolerance;
+        let most2 = if before.tolerance > 0.0 { cut / corner.cos_theta } else { f64::INFINITY };
+        let clear = 4.0 * blend.speed_max * blend.speed_max > most2;
+        if blend.speed_max > straight_on
+            && (clear || blend.speed_max > 0.5 * parabola_speed(limits, before, next, &corner))
+        {
             forget_kink(before, next);
             next.length -= arc.reach;
             if arc.keeps {
@@ -64,16 +68,17 @@ pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) ->
                 before.end_with(End::Tangent, next);
             }
             next.parabola_before = false;
-            return Joint::Arc { blend: Box::new(blend), keeps: arc.keeps };
+            return Some(Between { blend, keeps: arc.keeps });
         }
     }
+    let parabola = 0.5 * parabola_speed(limits, before, next, &corner);
     if straight_on > parabola {
         before.end_with(End::Tangent, next);
     } else {
         forget_kink(before, next);
         before.end_with(End::Parabola, next);
     }
-    Joint::Plain
+    None
 }
 
 fn forget_kink(before: &mut Segment, next: &mut Segment) {
@@ -159,8 +164,8 @@ impl RoundedCorner {
         }
         let theta = 0.5 * (std::f64::consts::PI - turn);
         let mut less = 0.0;
-        let mut side = |shape: &Shape, at: usize, share: f64, length: f64, towards: f64, other: DVec3| {
-            let Shape::Arc(circle) = shape else { return Some(length) };
+        let mut side = |segment: &Segment, at: usize, share: f64, length: f64, towards: f64, other: DVec3| {
+            let Some(circle) = &segment.circle else { return Some(length) };
             if across.cross(circle.normal).length() > SAME_DIRECTION {
                 return None;
             }
@@ -174,8 +179,8 @@ impl RoundedCorner {
             Some(most * circle.radius)
         };
         let half = 0.5 * before.nominal_length;
-        let l1 = side(&before.shape, 1, 2.0 / 3.0, before.length.min(half), 1.0, next.first)?;
-        let l2 = side(&next.shape, 0, 1.0 / 3.0, 0.5 * next.length, -1.0, before.last)?;
+        let l1 = side(before, 1, 2.0 / 3.0, before.length.min(half), 1.0, next.first)?;
+        let l2 = side(next, 0, 1.0 / 3.0, 0.5 * next.length, -1.0, before.last)?;
         if less > 0.0 {
             let theta = (theta - less).max(SMALLEST_ANGLE);
             (turn, sin_theta, cos_theta) = (std::f64::consts::PI - 2.0 * theta, theta.sin(), theta.cos());
@@ -188,7 +193,8 @@ impl RoundedCorner {
         let acceleration = in_plane(across, limits.acceleration);
         let normal = NORMAL * acceleration;
         let asked = before.speed_asked().max(next.speed_asked());
-        let goal = asked.min(highest_speed(limits, before, next, turn, across));
+        let plane = in_plane(across, limits.speed);
+        let goal = if asked <= plane { asked } else { asked.min(plane.max(altitude(before, next, turn))) };
 
         let tan_theta = sin_theta / cos_theta;
         // h = P / (1 - sin theta), d = h cos theta; 1 - sin = cos^2 / (1 + sin).
@@ -214,6 +220,7 @@ impl RoundedCorner {
         let length = self.radius * self.turn + rest;
         let mut blend = Segment {
             shape: Shape::Blend,
+            circle: None,
             end: End::Tangent,
             parabola_before: false,
             length,
@@ -250,15 +257,13 @@ fn in_plane(normal: DVec3, limits: DVec3) -> f64 {
     (limits * limits / along).min_element().sqrt()
 }
 
-fn highest_speed(limits: &Limits, before: &Segment, next: &Segment, turn: f64, across: DVec3) -> f64 {
-    let plane = in_plane(across, limits.speed);
+/// The least speed on the line between the speed vectors of two lines; 0 beside an arc.
+fn altitude(before: &Segment, next: &Segment, turn: f64) -> f64 {
     if before.shape != Shape::Line || next.shape != Shape::Line {
-        return plane;
+        return 0.0;
     }
-    // The shortest speed on the line between the two speed vectors.
     let (m1, m2) = (before.speed_max, next.speed_max);
     let turn_cos = turn.min(0.49 * std::f64::consts::PI).cos();
     let (v1, v2) = (m1.min(m2 / turn_cos), m2.min(m1 / turn_cos));
-    let base = (next.first * v2 - before.last * v1).length();
-    (v1 * v2 * turn.sin() / base).max(plane)
+    v1 * v2 * turn.sin() / (next.first * v2 - before.last * v1).length()
 }

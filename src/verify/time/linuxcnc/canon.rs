@@ -29,7 +29,7 @@ impl Controller {
             tolerance,
             merge: 0.0,
             chain: Chain { from: at, ..Chain::default() },
-            queue: VecDeque::with_capacity(1024),
+            queue: VecDeque::with_capacity(3 * (limits.depth + 8)),
             cycles: Cycles::default(),
         }
     }
@@ -97,11 +97,12 @@ impl Controller {
             climb: arc.climb,
         };
         let speed = arc.length / time;
-        let segment = self.segment(Shape::Arc(circle), arc.length, [arc.first, arc.last], false);
+        let segment = self.segment(Shape::Arc, arc.length, [arc.first, arc.last], false);
         self.push(Segment {
             requested: feed.min(speed),
             speed_max: speed.min(arc.length / self.limits.period),
             acceleration: arc.length / slow,
+            circle: Some(Box::new(circle)),
             ..segment
         });
     }
@@ -158,6 +159,7 @@ impl Controller {
     fn segment(&self, shape: Shape, length: f64, tangents: [DVec3; 2], rapid: bool) -> Segment {
         Segment {
             shape,
+            circle: None,
             rapid,
             end: self.end,
             parabola_before: false,

@@ -59,16 +59,23 @@ fn end_speed(segment: &Segment, next: Option<&Segment>, limits: &Limits) -> f64 
     }
 }
 
-/// Runs whole cycles at an even speed, as long as braking is far.
+/// Runs whole cycles at an even speed, as long as braking is not due: it begins
+/// (v^2 - end^2) / 2a + v T before the end.
 fn cruise(head: &mut Segment, next: Option<&Segment>, limits: &Limits, most: u64) -> u64 {
     let speed = head.speed;
-    if most == 0 || head.ramp || head.handing_over || speed <= 0.0 || speed != target(head, limits) {
+    if most == 0 || head.handing_over || speed <= 0.0 {
         return 0;
     }
     let end = end_speed(head, next, limits);
-    let brake = (speed * speed - end * end) / (2.0 * head.acceleration_along());
     let step = speed * limits.period;
-    let cycles = (head.left() - brake.max(0.0)) / step - 4.0;
+    let left = head.left();
+    let cycles = if even(head, end, left, limits) {
+        left / step - 1.0
+    } else if !head.ramp && speed == target(head, limits) {
+        (left - (speed * speed - end * end).max(0.0) / (2.0 * head.acceleration_along())) / step - 2.0
+    } else {
+        return 0;
+    };
     if cycles < 1.0 {
         return 0;
     }
@@ -80,8 +87,11 @@ fn cruise(head: &mut Segment, next: Option<&Segment>, limits: &Limits, most: u64
 /// One step of a segment over its period.
 fn step(segment: &mut Segment, next: Option<&Segment>, limits: &Limits) {
     let end = end_speed(segment, next, limits);
-    let along = segment.acceleration_along();
     let left = segment.left();
+    if even(segment, end, left, limits) {
+        return coast(segment, limits);
+    }
+    let along = segment.acceleration_along();
     let (acceleration, desired) = if segment.ramp && segment.end == End::Tangent && end >= NO_SPEED {
         let mean = 0.5 * (segment.speed + end);
         let time = if mean > NO_SPEED { (left / mean).max(1e-16) } else { 1e-16 };
@@ -102,6 +112,28 @@ fn step(segment: &mut Segment, next: Option<&Segment>, limits: &Limits) {
     }
     segment.braking = (desired - segment.speed).abs() < NO_SPEED && acceleration < 0.0;
     look_for_end(segment, end, along, limits);
+}
+
+/// Whether nothing changes the speed from here to the end.
+fn even(segment: &Segment, end: f64, left: f64, limits: &Limits) -> bool {
+    segment.speed == end
+        && end > NO_SPEED
+        && (segment.ramp || segment.speed == target(segment, limits) && left >= end * segment.period)
+}
+
+/// What [`step`] comes to at an even speed.
+fn coast(segment: &mut Segment, limits: &Limits) {
+    let speed = segment.speed;
+    segment.progress = (segment.progress + speed * segment.period).min(segment.length);
+    segment.braking = false;
+    segment.period = limits.period;
+    let left = segment.left();
+    if left <= SAME_PLACE {
+        segment.progress = segment.length;
+        segment.ending = Some(Ending { time: 0.0, speed });
+    } else if left < speed * limits.period {
+        segment.ending = Some(Ending { time: left / speed, speed });
+    }
 }
 
 /// Acceleration of a step, and the speed from which the end can just be braked for.

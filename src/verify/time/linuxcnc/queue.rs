@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 
-use super::blend::{Joint, join};
+use super::blend::{Between, join};
 use super::segment::{End, Segment};
 use super::{Controller, Limits};
 
@@ -18,16 +18,14 @@ impl Controller {
             if before.rapid != next.rapid {
                 before.end_with(End::Stop, &mut next);
             }
-            match join(&self.limits, before, &mut next) {
-                Joint::Plain => before.settle(self.limits.period),
-                Joint::Arc { blend, keeps } => {
-                    if keeps {
-                        before.settle(self.limits.period);
-                    } else {
-                        self.queue.pop_back();
-                    }
-                    self.queue.push_back(*blend);
-                }
+            let between = join(&self.limits, before, &mut next);
+            if between.as_ref().is_none_or(|between| between.keeps) {
+                before.settle(self.limits.period);
+            } else {
+                self.queue.pop_back();
+            }
+            if let Some(Between { blend, .. }) = between {
+                self.queue.push_back(blend);
             }
         }
         self.queue.push_back(next);

@@ -19,11 +19,11 @@ pub(super) enum End {
     Tangent,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shape {
     Line,
     /// An arc of the program.
-    Arc(Circle),
+    Arc,
     /// An arc that rounds a corner.
     Blend,
 }
@@ -41,9 +41,11 @@ pub(super) struct Circle {
 }
 
 /// One segment of the controller's queue. Lengths in mm, speeds in mm/s.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Segment {
     pub shape: Shape,
+    /// Of an arc of the program; few programs have them, so they stand apart.
+    pub circle: Option<Box<Circle>>,
     pub rapid: bool,
     pub end: End,
     /// A parabola leads into it.
@@ -117,7 +119,7 @@ impl Segment {
             return;
         }
         self.speed_max = self.speed_max.min(self.length / period);
-        if let Shape::Arc(circle) = self.shape {
+        if let Some(circle) = &self.circle {
             let whole = self.acceleration_whole();
             let radius = circle.radius + circle.climb * circle.climb / circle.radius;
             let normal = self.speed_max * self.speed_max / radius;
