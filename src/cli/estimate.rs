@@ -9,7 +9,7 @@ use screenmill::verify::{Clock, Event, Extent, Kinematics, Language, Summary, Ti
 use serde_json::{Map, Value, json};
 
 use super::console::Console;
-use super::program::{Refused, bounds, clock, stream};
+use super::program::{Refused, bounds, clock, language, stream};
 use super::{Common, Outcome, Refusal};
 
 /// Milling time of a job or of programs, with what limits it
@@ -158,13 +158,16 @@ fn estimate(path: &Path, kinematics: &Kinematics) -> Result<Estimated, Refused> 
 
 /// RML-1 has no rapids, so its travel speed has to be found before the text is timed.
 fn travel_mm_min(path: &Path) -> Result<Option<f32>, Refused> {
+    if language(path)? != Language::Rml1 {
+        return Ok(None);
+    }
     let mut travel = screenmill::verify::Travel::default();
-    let summary = stream(path, &mut |event| {
+    stream(path, &mut |event| {
         if let Event::Move(motion) = event {
             travel.add(motion);
         }
     })?;
-    Ok(travel.mm_min().filter(|_| summary.language == Language::Rml1))
+    Ok(travel.mm_min())
 }
 
 fn parts(limits: &[(&'static str, f64)]) -> Value {

@@ -1,14 +1,18 @@
 //! Program files as arguments.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc;
 
-use screenmill::verify::{self, Event, Extent, Options, Reading, Summary};
+use screenmill::verify::{self, Event, Extent, Language, Options, Reading, Summary};
 use serde_json::{Value, json};
 
 /// Bytes read ahead: long enough for a header, so that the language is found.
 const BUFFER: usize = 1 << 16;
+/// Events handed from the reading thread at once, and how many such batches may wait.
+const BATCH: usize = 2048;
+const BATCHES: usize = 4;
 
 /// A program's text was refused.
 #[derive(Debug, thiserror::Error)]
@@ -24,20 +28,46 @@ fn open(path: &Path) -> Result<BufReader<File>, Refused> {
     Ok(BufReader::with_capacity(BUFFER, file))
 }
 
+/// The language of a program, from its beginning.
+pub fn language(path: &Path) -> Result<Language, Refused> {
+    let refused = |source| Refused::Open { path: path.into(), source };
+    Ok(verify::language(open(path)?.fill_buf().map_err(refused)?))
+}
+
 /// Reads a program whole.
 pub fn read(path: &Path) -> Result<Reading, Refused> {
     Reading::from(&mut open(path)?, &Options::default())
         .map_err(|source| Refused::Text { path: path.into(), source })
 }
 
-/// Reads a program event by event; a text without a motion is refused.
+/// Reads a program event by event; a text without a motion is refused. The text is taken apart on a
+/// thread of its own.
 pub fn stream(path: &Path, each: &mut dyn FnMut(&Event)) -> Result<Summary, Refused> {
     let refused = |source| Refused::Text { path: path.into(), source };
+    let mut file = open(path)?;
+    let (sender, batches) = mpsc::sync_channel::<Vec<Event>>(BATCHES);
     let mut moved = false;
-    let summary = verify::read(&mut open(path)?, &Options::default(), &mut |event| {
-        moved |= matches!(event, Event::Move(_));
-        each(event);
-        Ok(())
+    let summary = std::thread::scope(|scope| {
+        let reader = scope.spawn(move || {
+            let mut batch = Vec::with_capacity(BATCH);
+            let summary = verify::read(&mut file, &Options::default(), &mut |event| {
+                batch.push(*event);
+                if batch.len() == BATCH {
+                    // The other end takes everything until this one is done.
+                    let _ = sender.send(std::mem::replace(&mut batch, Vec::with_capacity(BATCH)));
+                }
+                Ok(())
+            });
+            let _ = sender.send(batch);
+            summary
+        });
+        for batch in batches {
+            for event in &batch {
+                moved |= matches!(event, Event::Move(_));
+                each(event);
+            }
+        }
+        reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
     .map_err(refused)?;
     if moved { Ok(summary) } else { Err(refused(verify::Error::Empty)) }

@@ -1,0 +1,90 @@
+//! `cargo bench --bench estimate [-- MILLIONS]`: a program of that many million blocks (10 if left out),
+//! read and timed for each of some machines; blocks a second, and the peak of memory.
+
+use std::hint::black_box;
+use std::io::{BufReader, Read};
+use std::time::Instant;
+
+use screenmill::machine::Machine;
+use screenmill::verify::{self, Clock, Kinematics, Options};
+
+/// The text of a wavy relief in blocks of 0.05 mm, made as it is read, so that no memory holds it.
+struct Relief {
+    left: u64,
+    block: u64,
+    line: Vec<u8>,
+    at: usize,
+    head: &'static [u8],
+}
+
+impl Read for Relief {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        if self.at == self.line.len() {
+            self.at = 0;
+            self.line.clear();
+            self.line.extend_from_slice(std::mem::take(&mut self.head));
+            // Some lines at once.
+            for _ in 0..256.min(self.left) {
+                self.left -= 1;
+                let (row, column) = (self.block / 1000, self.block % 1000);
+                let column = if row.is_multiple_of(2) { column } else { 999 - column };
+                let (x, y) = (0.05 * column as f64, 0.05 * row as f64);
+                let z = 0.15 * ((1.9 * x + 0.4 * y).sin() + 0.5 * (4.7 * x - y).cos() - 0.5);
+                use std::io::Write;
+                writeln!(self.line, "G1 X{x:.4} Y{y:.4} Z{z:.4}")?;
+                self.block += 1;
+                if self.left == 0 {
+                    self.line.extend_from_slice(b"G0 Z5\nM5\nM2\n");
+                }
+            }
+        }
+        let count = (self.line.len() - self.at).min(out.len());
+        out[..count].copy_from_slice(&self.line[self.at..self.at + count]);
+        self.at += count;
+        Ok(count)
+    }
+}
+
+fn relief(blocks: u64, head: &'static [u8]) -> BufReader<Relief> {
+    BufReader::with_capacity(1 << 16, Relief { left: blocks, block: 0, line: Vec::new(), at: 0, head })
+}
+
+/// Peak resident set in MB, where the system tells.
+fn peak_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
+}
+
+fn main() {
+    let millions: f64 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(10.0);
+    let blocks = (millions * 1e6) as u64;
+    let start = Instant::now();
+    black_box(std::io::copy(&mut relief(blocks, b""), &mut std::io::sink()).expect("no file is read"));
+    let making = start.elapsed().as_secs_f64();
+    let modes: [(&str, &'static [u8]); 4] = [
+        ("linuxcnc-sim", b"G21 G90 G64 P0.001 Q0\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
+        ("linuxcnc-sim", b"G21 G90 G64 P0.002\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
+        ("linuxcnc-sim", b"G21 G90 G61\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
+        ("grbl-router", b"G21 G90\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
+    ];
+    println!("{millions} million blocks; making the text is taken off ({making:.1} s)");
+    for (name, head) in modes {
+        let machine = Machine::find(name, None).expect("a machine that comes along");
+        let mut clock = Clock::new(&Kinematics::from(&machine), None);
+        let start = Instant::now();
+        let summary = verify::read(&mut relief(blocks, head), &Options::default(), &mut |event| {
+            clock.event(event);
+            Ok(())
+        })
+        .expect("a sound program");
+        let hours = clock.finish(summary.bytes).total_s / 3600.0;
+        let seconds = start.elapsed().as_secs_f64() - making;
+        let mode = String::from_utf8_lossy(head).lines().next().unwrap_or("").replace("G21 G90 ", "");
+        println!(
+            "{name:<13} {mode:<14} {:.2} million blocks a second, program of {hours:.2} h, peak {:.1} MB",
+            1e-6 * summary.blocks as f64 / seconds,
+            peak_mb().unwrap_or(f64::NAN)
+        );
+    }
+}
