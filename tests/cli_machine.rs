@@ -63,3 +63,33 @@ fn what_is_shown_of_a_machine_is_a_profile_again() {
         assert_eq!(String::from_utf8(again).ok(), String::from_utf8(shown).ok());
     }
 }
+
+#[test]
+fn a_machine_is_calibrated_by_three_times() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let (out, mine) = (folder.path().join("measure"), folder.path().join("mine.toml"));
+    let (out, mine) = (out.display(), mine.display());
+    let written = json(&format!("calibrate-machine --machine roland-egx-600 --out {out} --json"));
+    let seconds: Vec<f64> =
+        (0..3).map(|i| written["programs"][i]["expected_s"].as_f64().expect("seconds")).collect();
+    let sheet = std::fs::read_to_string(format!("{out}/sheet.txt")).expect("the sheet");
+    assert!(sheet.contains("1-acceleration.rml") && sheet.contains("Take the tool out"), "{sheet}");
+    // What a program takes by the profile is what estimate says of it.
+    let estimated = json(&format!("estimate {out}/2-corners.rml --machine roland-egx-600 --json"));
+    let off = estimated["time_s"].as_f64().expect("seconds") / seconds[1] - 1.0;
+    assert!(off.abs() < 1e-9, "{off}");
+    // A slower machine: a profile of its own, which estimate takes.
+    let [a, b, c] = [1.1 * seconds[0], 1.2 * seconds[1], 2.0 * seconds[2]];
+    let times = format!("--times {a} {b} {c}");
+    let found = json(&format!("calibrate-machine --machine roland-egx-600 {times} --out {mine} --json"));
+    assert!(found["acceleration_mm_s2"]["x"].as_f64() < Some(500.0), "{found}");
+    for (program, wanted) in [("1-acceleration", a), ("2-corners", b), ("3-blocks", c)] {
+        let estimated = json(&format!("estimate {out}/{program}.rml --machine {mine} --json"));
+        let seconds = estimated["time_s"].as_f64().expect("seconds");
+        assert!((seconds / wanted - 1.0).abs() < 1e-3, "{program}: {seconds} is not {wanted}");
+        assert!(!estimated["unconfirmed"].as_array().expect("a list").contains(&"motion".into()));
+    }
+    screenmill(&format!("calibrate-machine --machine roland-egx-600 {times} --out {out}"))
+        .code(2)
+        .stderr(contains("is a folder"));
+}

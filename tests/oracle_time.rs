@@ -5,6 +5,9 @@ mod linuxcnc_programs;
 
 use std::collections::HashMap;
 
+use screenmill::machine::Machine;
+use screenmill::pipeline::{calibrate_machine, programs_to_measure};
+use screenmill::post::Dialect;
 use screenmill::verify::{Corner, Kinematics, Options, Reading, Timing, time};
 
 fn grbl(acceleration: f64) -> Kinematics {
@@ -248,6 +251,57 @@ fn grbl_cuts_an_arc_into_chords() {
     }
     let machine = Kinematics { arc_mm: t, ..grbl(a) };
     close(run("G0 X5\nG4 P0\nG3 X5 Y0 I-5 F360", &machine).cutting_s, wanted);
+}
+
+/// The same programs timed with other constants give those constants back.
+#[test]
+fn calibration_finds_what_the_times_were_made_with() {
+    for name in ["roland-egx-600", "roland-srm-20", "grbl-router", "linuxcnc-mill"] {
+        let machine = Machine::find(name, None).expect("a profile that comes along");
+        let dialect = Dialect::find(&machine.dialects[0], None).expect("a dialect that comes along");
+        let mut other = machine.clone();
+        let motion = &mut other.motion;
+        for a in [&mut motion.acceleration_mm_s2.x, &mut motion.acceleration_mm_s2.y] {
+            *a *= 0.63;
+        }
+        motion.acceleration_mm_s2.z *= 0.63;
+        motion.corner_mm *= 1.7;
+        // LinuxCNC's blocks take what its servo loop takes.
+        motion.block_s = if name == "linuxcnc-mill" { 0.0 } else { 0.0125 };
+        let programs = programs_to_measure(&other, &dialect).expect("programs");
+        let times = programs.map(|program| program.expected_s);
+        let found = calibrate_machine(&machine, &dialect, times).expect("times that can be");
+        let got = &found.machine.motion;
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 2e-3 * b, "{name}: {a} is not {b}");
+        near(got.acceleration_mm_s2.x, other.motion.acceleration_mm_s2.x);
+        near(got.acceleration_mm_s2.z, other.motion.acceleration_mm_s2.z);
+        assert!((got.block_s - other.motion.block_s).abs() < 1e-5, "{name}: {}", got.block_s);
+        if found.corner_found {
+            near(got.corner_mm, other.motion.corner_mm);
+        }
+        assert_eq!(found.corner_found, name != "linuxcnc-mill");
+        assert!(found.off.iter().all(|off| off.abs() < 1e-3), "{name}: {:?}", found.off);
+        assert!(!got.unconfirmed);
+        // A block that adds nothing at this feed is not made up.
+        other.motion.block_s = 0.0;
+        let times = programs_to_measure(&other, &dialect).expect("programs").map(|p| p.expected_s);
+        let found = calibrate_machine(&machine, &dialect, times).expect("times that can be");
+        assert_eq!(found.machine.motion.block_s, 0.0);
+        // What no machine does is refused.
+        let [a, b, c] = times;
+        for (wrong, message) in [
+            ([1.0, b, c], "time 1 is 1 s"),
+            ([a, 2.0 * b, c], "time 2 is"),
+            ([a, b, 0.5 * c], "time 3 is"),
+            ([-a, b, c], "above 0"),
+            ([f64::NAN, b, c], "above 0"),
+        ] {
+            match calibrate_machine(&machine, &dialect, wrong) {
+                Err(error) => assert!(error.to_string().contains(message), "{name}: {error}"),
+                Ok(found) => assert!(!found.corner_found && message == "time 2 is", "{name}: {found:?}"),
+            }
+        }
+    }
 }
 
 /// Times that LinuxCNC's own controller took for the programs of tests/linuxcnc-sim/programs.rs, in

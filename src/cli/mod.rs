@@ -2,6 +2,7 @@
 //! the clock or asks for files by name.
 
 mod calibrate;
+mod calibrate_machine;
 mod check;
 mod compensate;
 mod console;
@@ -66,6 +67,7 @@ enum Command {
     Compensate(compensate::Arguments),
     Simulate(simulate::Arguments),
     Light(light::Arguments),
+    CalibrateMachine(calibrate_machine::Arguments),
     Machines(machines::Arguments),
     Posts(posts::Arguments),
     Fixtures(fixtures::Arguments),
@@ -111,6 +113,7 @@ pub fn run() -> ExitCode {
         Command::Compensate(arguments) => compensate::run(arguments, common),
         Command::Simulate(arguments) => simulate::run(arguments, common),
         Command::Light(arguments) => light::run(arguments, common),
+        Command::CalibrateMachine(arguments) => calibrate_machine::run(arguments, common),
         Command::Machines(arguments) => machines::run(arguments, common),
         Command::Posts(arguments) => posts::run(arguments, common),
         Command::Fixtures(arguments) => fixtures::run(arguments, common),

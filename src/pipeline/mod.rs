@@ -14,6 +14,7 @@ mod error;
 mod estimate;
 mod judge;
 mod light;
+mod machine_calibration;
 mod maps;
 mod pages;
 mod part;
@@ -29,6 +30,10 @@ pub use check::{Checked, Reach, check};
 pub use cut::{Milled, mill};
 pub use error::Error;
 pub use estimate::{Estimated, estimate};
+pub use machine_calibration::{
+    Calibrated, Error as CalibrationError, Measured, calibrate as calibrate_machine,
+    programs as programs_to_measure,
+};
 pub use relit::{Lit, Relit, relit};
 
 /// Part of the area that has to lie within `limits.deviation_mm`.
