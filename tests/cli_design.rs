@@ -197,21 +197,32 @@ fn a_mask_is_written_in_16_and_in_8_bits() {
 #[test]
 fn a_mask_that_makes_no_sense_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("mask.png");
-    let out = out.to_str().expect("text");
-    let refuse = |flags: &[&str], message: &str| {
-        let scene = sample("theatre");
-        screenmill(&[&["calibrate", scene.as_str()], flags].concat())
+    let scene = sample("theatre");
+    let refuse = |case: &str, flags: &[&str]| {
+        let file = format!("{}/tests/refuse/calibrate/{case}.txt", env!("CARGO_MANIFEST_DIR"));
+        let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{file}: {error}"));
+        let message = text.lines().next().expect("a message");
+        Command::cargo_bin("screenmill")
+            .expect("the program")
+            .current_dir(folder.path())
+            .args([&["calibrate", scene.as_str(), "--quiet"], flags].concat())
+            .assert()
             .code(2)
-            .stderr(predicate::str::contains(message));
-        assert!(is_empty(folder.path()));
+            .stderr(format!("error: {message}\n"));
+        assert!(is_empty(folder.path()), "{case}");
     };
-    refuse(&["--out", &out.replace(".png", ".tif")], "is not a .png");
-    refuse(&["--out", out, "--pixels", "0", "5"], "a mask has 1 to 32768 columns and rows");
-    refuse(&["--out", out, "--frustum", "1", "0", "-1", "1"], "left < right");
-    refuse(&["--out", out, "--frustum", "nan", "0", "1", "1"], "left < right");
-    refuse(&["--out", out, "--gamma", "0"], "an exponent from 0.1 to 10");
-    refuse(&["--out", &format!("{}/no/m.png", folder.path().display()), "--pixels", "2", "2"], "no/m");
+    refuse("kind", &["--out", "mask.tif"]);
+    refuse("no-pixels", &["--out", "mask.png", "--pixels", "0", "5"]);
+    refuse("too-many-pixels", &["--out", "mask.png", "--pixels", "4096", "40000"]);
+    refuse("frustum-turned", &["--out", "mask.png", "--frustum", "1", "0", "-1", "1"]);
+    refuse("frustum-nan", &["--out", "mask.png", "--frustum", "nan", "0", "1", "1"]);
+    refuse("frustum-beside", &["--out", "mask.png", "--frustum", "5", "5", "6", "6"]);
+    refuse("gamma", &["--out", "mask.png", "--gamma", "0"]);
+    let nowhere = format!("{}/no/m.png", folder.path().display());
+    screenmill(&["calibrate", &scene, "--out", &nowhere, "--pixels", "2", "2"])
+        .code(2)
+        .stderr(predicate::str::contains("no/m-8bit.png"));
+    assert!(is_empty(folder.path()));
 }
 
 #[test]

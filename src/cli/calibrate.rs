@@ -51,6 +51,11 @@ enum Unusable {
     )]
     Frustum { left: f64, bottom: f64, right: f64, top: f64, screen: [f64; 2] },
     #[error(
+        "--frustum {left} {bottom} {right} {top} lies beside the screen, {} {} {} {}; hint: in m on the screen plane, whose centre is 0 0",
+        -screen[0], -screen[1], screen[0], screen[1]
+    )]
+    Beside { left: f64, bottom: f64, right: f64, top: f64, screen: [f64; 2] },
+    #[error(
         "--gamma {gamma}: an exponent from 0.1 to 10 is meant; hint: 2.2 for most projectors, 1 for light itself"
     )]
     Gamma { gamma: f64 },
@@ -68,6 +73,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         given.and_then(|f| f.try_into().ok()).unwrap_or([-half[0], -half[1], half[0], half[1]]);
     if !(left < right && bottom < top && [left, bottom, right, top].iter().all(|v| v.is_finite())) {
         return Err(Unusable::Frustum { left, bottom, right, top, screen: half }.into());
+    }
+    if left >= half[0] || right <= -half[0] || bottom >= half[1] || top <= -half[1] {
+        return Err(Unusable::Beside { left, bottom, right, top, screen: half }.into());
     }
     let square =
         (f64::from(FOUR_K) * (top - bottom) / (right - left)).round().clamp(1.0, f64::from(MOST_PIXELS));
