@@ -48,7 +48,7 @@ fn finishing_that_cannot_be() {
         ("scallop-over-radius", spacing(Spacing::ScallopMm(0.2))),
         ("scallop-flat", Params { shape: "flat:0.2".parse().unwrap(), ..spacing(Spacing::ScallopMm(0.001)) }),
         ("leave-negative", Params { stock_to_leave_mm: -0.01, ..params() }),
-        ("direction", Params { direction_deg: 45.0, ..params() }),
+        ("direction-nan", Params { direction_deg: f64::NAN, ..params() }),
         (
             "cutter-below-sample",
             Params { shape: "ball:0.015".parse().unwrap(), spacing: Spacing::StepoverMm(0.01), ..params() },
@@ -94,6 +94,7 @@ fn roughing_that_cannot_be() {
         ("stepdown-infinite", rough::Params { stepdown_mm: f64::INFINITY, ..rough_params() }),
         ("rough-stepover", rough::Params { stepover_mm: Some(0.25), ..rough_params() }),
         ("rough-leave-negative", rough::Params { stock_to_leave_mm: -1.0, ..rough_params() }),
+        ("direction", rough::Params { direction_deg: 45.0, ..rough_params() }),
         ("clear-negative", rough::Params { clear_mm: -0.1, ..rough_params() }),
     ];
     for (case, params) in cases {

@@ -47,6 +47,10 @@ fn passes_along_y_are_passes_along_x_of_the_transposed_part() {
     let swapped: Vec<_> = along_y.moves.iter().map(|m| (m.kind, [m.to[1], m.to[0], m.to[2]])).collect();
     let straight: Vec<_> = along_x.moves.iter().map(|m| (m.kind, m.to)).collect();
     assert_eq!(straight, swapped);
+    let aslant = plan(&site(&part, UNIT, 0.0), &Params { direction_deg: 30.0, ..params() });
+    let turned_back = plan(&site(&turned, UNIT, 0.0), &Params { direction_deg: 60.0, ..params() });
+    let swapped: Vec<_> = turned_back.moves.iter().map(|m| (m.kind, [m.to[1], m.to[0], m.to[2]])).collect();
+    assert_eq!(aslant.moves.iter().map(|m| (m.kind, m.to)).collect::<Vec<_>>(), swapped);
     let clear = |direction_deg| rough::Params {
         shape: "flat:0.25".parse().unwrap(),
         stepdown_mm: 0.125,
@@ -83,6 +87,18 @@ fn tiles_of_a_part_have_their_passes_on_one_lattice() {
     let shift = (0.21875 / UNIT) as i32;
     assert!(part_of.passes.iter().all(|v| whole.passes.contains(&(v + shift))));
     assert_eq!((part_of.start + (0.5 / UNIT) as i32 - whole.start) % whole.pitch, 0);
+    let aslant = Params { direction_deg: 30.0, ..params() };
+    let cut = |site: &Site| cuts(&plan(site, &Params { pattern: Pattern::OneWay, ..aslant }));
+    let (whole, part_of) = (cut(&site(&part, UNIT, 0.0)), cut(&place));
+    // Vertices of one tile lie on lines of the other: whole units from one pass to the next.
+    let lines = |points: &BTreeSet<[i32; 3]>, at: [f64; 2]| -> BTreeSet<i64> {
+        let line = |p: &[i32; 3]| {
+            let [x, y] = [0, 1].map(|axis| f64::from(p[axis]) + at[axis] / UNIT);
+            (y - (30f64.to_radians().tan() * x).round()) as i64
+        };
+        points.iter().map(line).collect()
+    };
+    assert!(lines(&part_of, [0.5, 0.21875]).is_subset(&lines(&whole, [0.0; 2])));
 }
 
 #[test]

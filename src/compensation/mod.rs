@@ -26,6 +26,7 @@ mod interval;
 mod lanes;
 mod pairs;
 mod passes;
+mod places;
 mod profile;
 mod runs;
 mod slopes;
@@ -34,8 +35,9 @@ mod stream;
 mod tiles;
 mod unboxed;
 
-pub use drop::lift;
+pub use drop::{Faces, lift};
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows};
+pub use places::Places;
 pub use profile::Profile;
 pub use stream::{Band, stream};
 pub use tiles::{closing, cutter_location, cutter_location_rows, erode, residual};

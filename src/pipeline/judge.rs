@@ -235,13 +235,13 @@ impl Case<'_> {
         }
     }
 
-    /// What the passes leave before any simplification and rounding; None where their positions are not
-    /// as dense as the samples.
+    /// What the passes leave before any simplification and rounding; None where they run at an angle to the
+    /// samples, or their positions are not as dense.
     fn exact_passes(&self, around: &Heights, window: Window) -> Option<Heights> {
         let step_mm = self.surface.lattice().step_mm;
         let mut lowest: Option<Heights> = None;
         for passes in self.passes {
-            if (passes.layout.pitch_mm() - step_mm).abs() > 1e-9 * step_mm {
+            if passes.layout.slope != 0.0 || (passes.layout.pitch_mm() - step_mm).abs() > 1e-9 * step_mm {
                 return None;
             }
             let left = match passes.layout.along {

@@ -17,8 +17,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::passes::{Layout, tip_radius_mm};
-use super::strip::{Ceiling, Strip};
-use crate::compensation::{self, Profile, RowTarget};
+use super::strip::Strip;
+use crate::compensation::{self, Faces, Profile, RowTarget};
 use crate::cutter::Shape;
 use crate::tolerance::Budget;
 
@@ -26,20 +26,23 @@ use crate::tolerance::Budget;
 const BULGE_MOST: f64 = 0.25;
 
 /// Distances from the axis, as parts of the radius, within which the highest sample is known.
-const RINGS: [f64; 4] = [1.0, 0.93, 0.85, 0.75];
+pub(super) const RINGS: [f64; 4] = [1.0, 0.93, 0.85, 0.75];
 
 /// Columns of the blocks in which steep places are evaluated together.
 const STEEP_BLOCK: usize = 256;
 
 /// A cutter as the planner asks about it.
 pub(super) struct Cutter {
-    exact: Profile,
-    wide: Profile,
-    radius_mm: f64,
+    pub(super) exact: Profile,
+    pub(super) wide: Profile,
+    pub(super) radius_mm: f64,
     tip_mm: f64,
     /// Farthest contact from the tip's centre that is still on the round part.
     round_mm: f64,
-    pitch_mm: f64,
+    /// Between positions, along the pass.
+    pub(super) pitch_mm: f64,
+    /// How far a move may pass a position between its ends.
+    aside_mm: f64,
     budget: Budget,
     /// How far samples matter, in mm, with all that is added.
     pub(super) reach_mm: f64,
@@ -54,16 +57,16 @@ pub(super) struct Envelope {
 }
 
 /// By how much a cutter is widened so that it answers for `half_mm` either way along a line.
-fn allowance_mm(shape: &Shape, half_mm: f64, path_tolerance_mm: f64) -> f64 {
+fn allowance_mm(shape: &Shape, half_mm: f64, aside_mm: f64, path_tolerance_mm: f64) -> f64 {
     let radius = shape.radius_mm();
     match shape {
-        Shape::Flat { .. } => (radius + path_tolerance_mm).hypot(half_mm) - radius,
-        _ => half_mm + path_tolerance_mm,
+        Shape::Flat { .. } if aside_mm == 0.0 => (radius + path_tolerance_mm).hypot(half_mm) - radius,
+        _ => half_mm + aside_mm + path_tolerance_mm,
     }
 }
 
 impl Cutter {
-    /// For positions `pitch_mm` apart on samples `step_mm` apart.
+    /// For positions `pitch_mm` apart on samples `step_mm` apart, which moves pass within `aside_mm`.
     ///
     /// # Errors
     /// The cutter is smaller than a sample or spans too many.
@@ -71,9 +74,10 @@ impl Cutter {
         shape: Shape,
         step_mm: f64,
         pitch_mm: f64,
+        aside_mm: f64,
         budget: Budget,
     ) -> Result<Cutter, compensation::Error> {
-        let allowance_mm = allowance_mm(&shape, 0.5 * pitch_mm, budget.path_tolerance_mm);
+        let allowance_mm = allowance_mm(&shape, 0.5 * pitch_mm, aside_mm, budget.path_tolerance_mm);
         let tip_mm = tip_radius_mm(&shape);
         let round_mm = match shape {
             Shape::Taper { half_angle_deg, .. } => tip_mm * half_angle_deg.to_radians().cos(),
@@ -86,17 +90,24 @@ impl Cutter {
             tip_mm,
             round_mm,
             pitch_mm,
+            aside_mm,
             budget,
             reach_mm: shape.radius_mm() + allowance_mm + pitch_mm + step_mm,
         })
     }
 
     /// The bounds of a band's passes by the better of both ways, interval by interval.
-    pub(super) fn envelopes(&self, strip: &Strip, layout: &Layout, passes: Range<usize>) -> Vec<Envelope> {
+    pub(super) fn envelopes(
+        &self,
+        strip: &Strip,
+        wide: &Faces,
+        layout: &Layout,
+        passes: Range<usize>,
+    ) -> Vec<Envelope> {
         let across = passes.clone().map(|k| layout.across_mm(k));
-        let exact = self.rows(strip, &self.exact, layout, across);
+        let exact = self.rows(strip, &self.exact, &Faces::new(&strip.outlines, &self.exact), layout, across);
         if self.tip_mm <= 0.0 {
-            let mut envelopes = self.widened(strip, layout, passes);
+            let mut envelopes = self.widened(strip, wide, layout, passes);
             envelopes.par_iter_mut().zip(exact).for_each(|(envelope, cl_mm)| envelope.cl_mm = cl_mm);
             return envelopes;
         }
@@ -107,7 +118,7 @@ impl Cutter {
             .map(|(k, cl_mm)| self.curved(strip, layout, layout.across_mm(k), cl_mm))
             .collect();
         let (mut envelopes, steep): (Vec<Envelope>, Vec<Vec<bool>>) = curved.into_iter().unzip();
-        let wide = self.steep_places(strip, layout, passes, &steep);
+        let wide = self.steep_places(strip, wide, layout, passes, &steep);
         envelopes.par_iter_mut().zip(steep).zip(wide).for_each(|((envelope, steep), wide)| {
             for (i, _) in steep.iter().enumerate().filter(|s| *s.1) {
                 let (left, right) = (f64::from(wide[i]), f64::from(wide[i + 1]));
@@ -127,7 +138,7 @@ impl Cutter {
         across_mm: f64,
         cl_mm: Vec<f32>,
     ) -> (Envelope, Vec<bool>) {
-        let around_mm = self.budget.path_tolerance_mm + 0.5 * self.pitch_mm;
+        let around_mm = self.strays_mm() + 0.5 * self.pitch_mm;
         let ceilings = RINGS.map(|part| strip.ceiling(across_mm, part * self.radius_mm + around_mm));
         let mut bound_mm: Vec<f64> =
             cl_mm.iter().map(|&z| if z.is_nan() { f64::NEG_INFINITY } else { f64::from(z) }).collect();
@@ -138,7 +149,8 @@ impl Cutter {
             }
             let (left, right) = (f64::from(cl_mm[i - 1]), f64::from(cl_mm[i]));
             let middle_mm = layout.start_mm() + (i as f64 - 0.5) * self.pitch_mm;
-            match self.contact_mm(&ceilings, middle_mm, left.min(right)).and_then(|t| self.lift_mm(t)) {
+            let contact = self.contact_mm(left.min(right), |ring| ceilings[ring].at(middle_mm));
+            match contact.and_then(|t| self.lift_mm(t)) {
                 Some(lift_mm) => {
                     bound_mm[i - 1] = bound_mm[i - 1].max(left + lift_mm);
                     bound_mm[i] = bound_mm[i].max(right + lift_mm);
@@ -149,9 +161,14 @@ impl Cutter {
         (Envelope { bound_mm, cl_mm }, steep)
     }
 
+    /// How far from its line the cutter may be, sideways and by the controller.
+    pub(super) fn strays_mm(&self) -> f64 {
+        self.budget.path_tolerance_mm + self.aside_mm
+    }
+
     /// Ends of a line over a steep interval. Each half of it must stand above its own end's location: on
     /// a slope both ends are raised by half their difference, at a wall both stand at the higher one.
-    fn steep_ends(&self, left_mm: f64, right_mm: f64) -> (f64, f64) {
+    pub(super) fn steep_ends(&self, left_mm: f64, right_mm: f64) -> (f64, f64) {
         let apart_mm = (left_mm - right_mm).abs();
         if apart_mm <= self.pitch_mm {
             (left_mm + 0.5 * apart_mm, right_mm + 0.5 * apart_mm)
@@ -164,6 +181,7 @@ impl Cutter {
     fn steep_places(
         &self,
         strip: &Strip,
+        wide: &Faces,
         layout: &Layout,
         passes: Range<usize>,
         steep: &[Vec<bool>],
@@ -191,7 +209,7 @@ impl Cutter {
                         count,
                     })
                     .collect();
-                let heights = self.targets(strip, &self.wide, &targets);
+                let heights = self.targets(strip, &self.wide, wide, &targets);
                 found.into_iter().zip(heights).map(|((pass, first, _), z)| (pass, first, z)).collect()
             })
             .collect();
@@ -203,8 +221,14 @@ impl Cutter {
     }
 
     /// The bounds of a band's passes by the steep way alone; they hold beyond the part, too.
-    pub(super) fn widened(&self, strip: &Strip, layout: &Layout, passes: Range<usize>) -> Vec<Envelope> {
-        let wide = self.rows(strip, &self.wide, layout, passes.map(|k| layout.across_mm(k)));
+    pub(super) fn widened(
+        &self,
+        strip: &Strip,
+        wide: &Faces,
+        layout: &Layout,
+        passes: Range<usize>,
+    ) -> Vec<Envelope> {
+        let wide = self.rows(strip, &self.wide, wide, layout, passes.map(|k| layout.across_mm(k)));
         wide.into_par_iter()
             .map(|cl_mm| {
                 let bound_mm = (0..cl_mm.len())
@@ -221,7 +245,13 @@ impl Cutter {
 
     /// Lowest height in mm at which the cutter may go straight from one place to another (along,
     /// across); None where nothing is in reach, so that nothing is known of what stands there.
-    pub(super) fn straight(&self, strip: &Strip, from_mm: [f64; 2], to_mm: [f64; 2]) -> Option<f64> {
+    pub(super) fn straight(
+        &self,
+        strip: &Strip,
+        wide: &Faces,
+        from_mm: [f64; 2],
+        to_mm: [f64; 2],
+    ) -> Option<f64> {
         let (du, dv) = (to_mm[0] - from_mm[0], to_mm[1] - from_mm[1]);
         let steps = (du.hypot(dv) / self.pitch_mm).ceil().max(1.0);
         let places: Vec<[f64; 2]> = (0..=steps as usize)
@@ -234,23 +264,47 @@ impl Cutter {
         if drops.iter().any(|z| z.is_nan()) {
             return None;
         }
-        Some(drops.into_iter().fold(f64::NEG_INFINITY, f64::max))
+        let lifted = places.iter().zip(drops).map(|(&place, z_mm)| wide.lift_point(place, z_mm));
+        Some(lifted.fold(f64::NEG_INFINITY, f64::max))
     }
 
-    /// Locations of a profile along rows like those of the layout, at other places across.
+    /// The faces of a strip as the widened cutter meets them.
+    pub(super) fn faces<'a>(&self, strip: &'a Strip) -> Faces<'a> {
+        Faces::new(&strip.outlines, &self.wide)
+    }
+
+    /// Locations of a profile along rows like those of the layout, at other places across; never below the
+    /// drop on the profile's `faces`.
     pub(super) fn rows(
         &self,
         strip: &Strip,
         profile: &Profile,
+        faces: &Faces,
         layout: &Layout,
         across_mm: impl Iterator<Item = f64>,
     ) -> Vec<Vec<f32>> {
         let targets: Vec<RowTarget> =
             across_mm.map(|y_mm| RowTarget { x0_mm: layout.start_mm(), y_mm, count: layout.count }).collect();
-        self.targets(strip, profile, &targets)
+        self.targets(strip, profile, faces, &targets)
     }
 
-    fn targets(&self, strip: &Strip, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+    fn targets(
+        &self,
+        strip: &Strip,
+        profile: &Profile,
+        faces: &Faces,
+        targets: &[RowTarget],
+    ) -> Vec<Vec<f32>> {
+        let mut rows = self.sampled(strip, profile, targets);
+        if !faces.is_empty() {
+            rows.par_iter_mut()
+                .zip(targets)
+                .for_each(|(z_mm, target)| faces.lift_row(target, self.pitch_mm, z_mm));
+        }
+        rows
+    }
+
+    fn sampled(&self, strip: &Strip, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f32>> {
         if (self.pitch_mm - profile.step_mm()).abs() < 1e-9 {
             return compensation::rows(&strip.heights, profile, targets);
         }
@@ -268,16 +322,17 @@ impl Cutter {
     /// How far from the tip's centre a contact that asks for more than `z_mm` can lie; None if it may lie
     /// past the round part. A sample asks for h - r + Z, so Z > r + z - h; and only samples within that
     /// contact's distance count, which may stand lower than the highest of all.
-    fn contact_mm(&self, ceilings: &[Ceiling], along_mm: f64, z_mm: f64) -> Option<f64> {
+    /// `ceiling` tells the highest point within each of [`RINGS`].
+    pub(super) fn contact_mm(&self, z_mm: f64, mut ceiling: impl FnMut(usize) -> f64) -> Option<f64> {
         let tip = self.tip_mm;
         // From the axis; a bull's round part begins where its flat ends.
         let inner = if self.round_mm < tip { 0.0 } else { (self.radius_mm - tip).max(0.0) };
         let mut farthest = f64::INFINITY;
-        for (ceiling, part) in ceilings.iter().zip(RINGS) {
+        for (ring, part) in RINGS.into_iter().enumerate() {
             if part < 1.0 && inner + farthest > part * self.radius_mm {
                 break;
             }
-            let centre = tip - (ceiling.at(along_mm) - z_mm).max(0.0);
+            let centre = tip - (ceiling(ring) - z_mm).max(0.0);
             if centre <= 0.0 {
                 return None;
             }
@@ -288,15 +343,19 @@ impl Cutter {
 
     /// What must be added to the chord for contacts up to `contact_mm` from the tip's centre: what bulge
     /// and controller take beyond their shares of the budget. None where only the steep way holds.
-    fn lift_mm(&self, contact_mm: f64) -> Option<f64> {
+    pub(super) fn lift_mm(&self, contact_mm: f64) -> Option<f64> {
         let tip = self.tip_mm;
         let contact = contact_mm + self.pitch_mm;
-        let strayed = contact + self.budget.path_tolerance_mm;
+        let strayed = contact + self.strays_mm();
         if strayed >= 0.99 * self.round_mm {
             return None;
         }
         let above = (tip * tip - contact * contact).sqrt();
-        let bulge_mm = tip * tip * self.pitch_mm * self.pitch_mm / (8.0 * above * above * above);
+        // From one position to the next it may be farther than along the line.
+        let pitch_mm = self.pitch_mm + self.aside_mm;
+        // Sideways a concave height rises by no more than its slope.
+        let sideways_mm = self.aside_mm * strayed / (tip * tip - strayed * strayed).sqrt();
+        let bulge_mm = tip * tip * pitch_mm * pitch_mm / (8.0 * above * above * above) + sideways_mm;
         if bulge_mm > BULGE_MOST * self.pitch_mm {
             return None;
         }

@@ -6,9 +6,12 @@ use super::envelope::{Cutter, Envelope};
 use super::passes::{contact_radius_mm, tip_radius_mm};
 use super::pen::Pen;
 use super::strip::{Strip, band_length};
-use super::{Axis, Error, GridPoint, Layout, Progress, Site, Tilt, Toolpath, ends, funnel, link};
+use super::{Axis, Error, GridPoint, Layout, Progress, Site, Tilt, Toolpath, ends, funnel, link, slant};
 use crate::cutter::Shape;
 use crate::tolerance::EXCESS_MM;
+
+/// Positions this part of their distance beside a line still make a line.
+const STRAIGHT: f64 = 0.02;
 
 /// How far apart passes lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +36,7 @@ pub enum Pattern {
 pub struct Params {
     pub shape: Shape,
     pub spacing: Spacing,
-    /// 0: along X, 90: along Y.
+    /// 0: along X, 90: along Y; any number.
     pub direction_deg: f64,
     pub pattern: Pattern,
     /// Added to every height, in mm: above 0 it is a semi-finish.
@@ -59,16 +62,18 @@ pub fn stepover_mm(shape: &Shape, scallop_mm: f64, slope_across: f64) -> Result<
 /// Where the passes lie and where on them the cutter location is evaluated.
 pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
     site.validate(0.0)?;
-    let along = Axis::from_deg(params.direction_deg)?;
+    let (along, slope) = Axis::from_deg(params.direction_deg)?;
     if !(params.stock_to_leave_mm >= 0.0 && params.stock_to_leave_mm.is_finite()) {
         return Err(Error::StockToLeave { leave_mm: params.stock_to_leave_mm });
     }
     let (slope_along, slope_across) = along.split(site.surface.steepest());
+    let length = slope.hypot(1.0);
     let diameter_mm = 2.0 * params.shape.radius_mm();
     let (spacing_mm, hint) = match params.spacing {
         Spacing::StepoverMm(stepover_mm) => (stepover_mm, "a stepover_mm of at least one unit"),
         Spacing::ScallopMm(scallop_mm) => {
-            let wide = stepover_mm(&params.shape, scallop_mm, slope_across)?;
+            let steepest = (slope.abs() * slope_along + slope_across) / length;
+            let wide = stepover_mm(&params.shape, scallop_mm, steepest)?;
             (
                 wide.min(diameter_mm),
                 "give stepover_mm, or a larger scallop_mm: the steepest face sets this one",
@@ -78,7 +83,10 @@ pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
     if !(spacing_mm > 0.0 && spacing_mm <= diameter_mm) {
         return Err(Error::Stepover { stepover_mm: spacing_mm, diameter_mm });
     }
-    let stepover = (spacing_mm / site.unit_mm + 1e-9).floor();
+    let stepover = (spacing_mm * length / site.unit_mm + 1e-9).floor();
+    // Moves of neighbouring slanted passes come up to a unit closer or farther than the passes.
+    let kept = slope != 0.0 && matches!(params.spacing, Spacing::ScallopMm(_));
+    let stepover = if kept { stepover - 1.0 } else { stepover };
     if stepover < 1.0 {
         return Err(Error::StepoverUnit { stepover_mm: spacing_mm, unit_mm: site.unit_mm, hint });
     }
@@ -90,8 +98,10 @@ pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
         false => contact_radius_mm(&params.shape, slope),
     };
     let overrun_mm = [slope_along, slope_across].map(|slope| reach_mm(slope) + past);
-    site.validate(overrun_mm[0].max(overrun_mm[1]) + spacing_mm + diameter_mm)?;
-    Ok(Layout::covering(site, along, stepover as i32, overrun_mm))
+    let lattice = site.surface.lattice();
+    let risen_mm = slope.abs() * lattice.width_mm.max(lattice.height_mm);
+    site.validate(overrun_mm[0].max(overrun_mm[1]) + spacing_mm + diameter_mm + risen_mm)?;
+    Ok(Layout::covering(site, (along, slope), stepover as i32, overrun_mm))
 }
 
 /// A cut without a break: vertices along the pass and up, in units.
@@ -104,11 +114,10 @@ type Run = Vec<[i32; 2]>;
 pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpath, Error> {
     let layout = layout(site, params)?;
     let lattice = site.surface.lattice();
-    let cutter = Cutter::new(params.shape, lattice.step_mm, layout.pitch_mm(), site.budget)?;
-    let stepover_mm = match layout.passes[..] {
-        [first, second, ..] => f64::from(second - first) * site.unit_mm,
-        _ => 2.0 * params.shape.radius_mm(),
-    };
+    let cutter =
+        Cutter::new(params.shape, lattice.step_mm, layout.length_mm(), layout.aside_mm(), site.budget)?;
+    let stepover_mm = layout.stepover_mm().unwrap_or(2.0 * params.shape.radius_mm());
+    let slanted = layout.slope != 0.0;
     let longest_mm = link::LONGEST_STEPOVERS * stepover_mm;
     let passes = layout.passes.len();
     let mut pen = Pen::new(site);
@@ -117,11 +126,20 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
     let mut tilt = Tilt::default();
     let mut first = 0;
     while first < passes {
-        let last = first + band_length(&layout, first, lattice.step_mm, cutter.reach_mm) - 1;
+        let length = match slanted {
+            true => slant::band_length(&layout, first),
+            false => band_length(&layout, first, lattice.step_mm, cutter.reach_mm),
+        };
+        let last = first + length - 1;
         // The link from the band before is judged in this band.
         let low_mm = layout.across_mm(first) - longest_mm;
-        let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), cutter.reach_mm)?;
-        let envelopes = cutter.envelopes(&strip, &layout, first..last + 1);
+        let read = || Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), cutter.reach_mm);
+        let strip = if slanted { None } else { Some(read()?) };
+        let ground = strip.as_ref().map(|strip| (strip, cutter.faces(strip)));
+        let envelopes = match &ground {
+            Some((strip, faces)) => cutter.envelopes(strip, faces, &layout, first..last + 1),
+            None => slant::envelopes(site, &cutter, &layout, first..last + 1)?,
+        };
         let planned: Vec<(Vec<Run>, Tilt)> = (first..last + 1)
             .into_par_iter()
             .zip(envelopes)
@@ -139,19 +157,23 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
         let joints = joints(&layout, first, &band, before);
         let links: Vec<Option<i32>> = joints
             .par_iter()
-            .map(|&(from, to)| {
-                if params.pattern == Pattern::OneWay {
-                    return None;
+            .map(|&(from, to)| match &ground {
+                _ if params.pattern == Pattern::OneWay => Ok(None),
+                Some((strip, faces)) => {
+                    let leave_mm = params.stock_to_leave_mm;
+                    Ok(link::level(site, &cutter, strip, faces, from, to, leave_mm, longest_mm))
                 }
-                link::level(site, &cutter, &strip, from, to, params.stock_to_leave_mm, longest_mm)
+                None => {
+                    let leave_mm = params.stock_to_leave_mm;
+                    link::elsewhere(site, &cutter, layout.along, from, to, leave_mm, longest_mm)
+                }
             })
-            .collect();
+            .collect::<Result<_, Error>>()?;
         let mut links = links.into_iter();
         for (offset, runs) in band.iter().enumerate() {
             let k = first + offset;
-            let across = layout.passes[k];
             for (nth, run) in runs.iter().enumerate() {
-                let start = [run[0][0], across, run[0][1]];
+                let start = [run[0][0], layout.across(k, run[0][0]), run[0][1]];
                 let linked = match before {
                     Some((_, from)) if nth == 0 => links.next().flatten().map(|z| (from, z)),
                     _ => None,
@@ -170,10 +192,10 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
                     }
                 }
                 for &[u, z] in &run[1..] {
-                    pen.cut(layout.along.point(u, across, z));
+                    pen.cut(layout.along.point(u, layout.across(k, u), z));
                 }
                 let end = run[run.len() - 1];
-                before = Some((k, [end[0], across, end[1]]));
+                before = Some((k, [end[0], layout.across(k, end[0]), end[1]]));
             }
             since_retract += 1;
         }
@@ -184,7 +206,10 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
         return Err(Error::NoData { samples: lattice.columns * lattice.rows });
     }
     let mut path = pen.finish();
-    path.tilt = (params.stock_to_leave_mm == 0.0).then_some(tilt);
+    // Positions of a slanted pass on a coarse grid stand so far to both sides of its line that their own heights
+    // zigzag: no slope to compare with.
+    let straight = layout.aside_mm() <= STRAIGHT * layout.pitch_mm();
+    path.tilt = (params.stock_to_leave_mm == 0.0 && straight).then_some(tilt);
     Ok(path)
 }
 
@@ -207,13 +232,12 @@ fn joints(
     let mut end = before.map(|(_, at)| at);
     let mut out = Vec::new();
     for (offset, runs) in band.iter().enumerate() {
-        let across = layout.passes[first + offset];
+        let place = |[u, z]: [i32; 2]| [u, layout.across(first + offset, u), z];
         let (Some(head), Some(tail)) = (runs.first(), runs.last()) else { continue };
         if let Some(from) = end {
-            out.push((from, [head[0][0], across, head[0][1]]));
+            out.push((from, place(head[0])));
         }
-        let at = tail[tail.len() - 1];
-        end = Some([at[0], across, at[1]]);
+        end = Some(place(tail[tail.len() - 1]));
     }
     out
 }
@@ -231,7 +255,7 @@ fn pass(
     let coarse = site.unit_mm > site.budget.simplify_mm + EXCESS_MM && params.stock_to_leave_mm == 0.0;
     let measure = ends::Measure {
         unit_mm: site.unit_mm,
-        pitch_mm: layout.pitch_mm(),
+        pitch_mm: layout.length_mm(),
         stepover_mm,
         tip_mm: tip_radius_mm(&params.shape),
     };

@@ -2,17 +2,20 @@
 
 use super::envelope::Cutter;
 use super::strip::Strip;
-use super::{GridPoint, Site};
+use super::{Axis, Error, GridPoint, Site};
+use crate::compensation::Faces;
 
 /// Longer ways than this many stepovers are travelled on the clearance plane.
 pub(super) const LONGEST_STEPOVERS: f64 = 4.0;
 
 /// Height in units of a level link from one place to another (along, across, units), or None where
 /// the way is too long, too high to be worth it, or leads past what is known.
+#[allow(clippy::too_many_arguments)]
 pub(super) fn level(
     site: &Site,
     cutter: &Cutter,
     strip: &Strip,
+    wide: &Faces,
     from: GridPoint,
     to: GridPoint,
     leave_mm: f64,
@@ -23,7 +26,29 @@ pub(super) fn level(
     if (b[0] - a[0]).hypot(b[1] - a[1]) > longest_mm {
         return None;
     }
-    let lowest_mm = cutter.straight(strip, a, b)? + leave_mm;
+    let lowest_mm = cutter.straight(strip, wide, a, b)? + leave_mm;
     let z = site.unit_above(lowest_mm).max(from[2]).max(to[2]);
     (z <= site.unit_above(site.top_allowance_mm)).then_some(z)
+}
+
+/// [`level`] where no strip is held: reads what the link's cutter can meet.
+pub(super) fn elsewhere(
+    site: &Site,
+    cutter: &Cutter,
+    along: Axis,
+    from: GridPoint,
+    to: GridPoint,
+    leave_mm: f64,
+    longest_mm: f64,
+) -> Result<Option<i32>, Error> {
+    let end = |pick: fn(i32, i32) -> i32, axis: usize| f64::from(pick(from[axis], to[axis])) * site.unit_mm;
+    let low_mm = [0, 1].map(|axis| end(Ord::min, axis));
+    let high_mm = [0, 1].map(|axis| end(Ord::max, axis));
+    if (high_mm[0] - low_mm[0]).hypot(high_mm[1] - low_mm[1]) > longest_mm {
+        return Ok(None);
+    }
+    let reach_mm = cutter.reach_mm;
+    let strip =
+        Strip::around(site.surface, along, low_mm.map(|mm| mm - reach_mm), high_mm.map(|mm| mm + reach_mm))?;
+    Ok(level(site, cutter, &strip, &cutter.faces(&strip), from, to, leave_mm, longest_mm))
 }

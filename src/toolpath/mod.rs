@@ -17,6 +17,7 @@ mod link;
 mod passes;
 mod pen;
 pub mod rough;
+mod slant;
 mod strip;
 mod tilt;
 
@@ -121,7 +122,7 @@ pub enum Error {
     ScallopTip { cutter: String },
     #[error("stock_to_leave_mm is {leave_mm}, it must be 0 or more")]
     StockToLeave { leave_mm: f64 },
-    #[error("direction_deg is {direction_deg}: passes run along X (0) or along Y (90)")]
+    #[error("direction_deg is {direction_deg}: roughing rows run along X (0) or along Y (90)")]
     Direction { direction_deg: f64 },
     #[error("{name} is {value}, it must be {wanted}")]
     Number { name: &'static str, value: f64, wanted: &'static str },

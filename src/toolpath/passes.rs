@@ -13,15 +13,16 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// The axis of a direction in degrees, 0 or 90.
-    pub fn from_deg(direction_deg: f64) -> Result<Axis, Error> {
-        if direction_deg == 0.0 || direction_deg == 180.0 {
-            Ok(Axis::X)
-        } else if direction_deg == 90.0 || direction_deg == 270.0 {
-            Ok(Axis::Y)
-        } else {
-            Err(Error::Direction { direction_deg })
+    /// The axis that a direction in degrees is nearest to, and how far across passes go for each step along it.
+    pub fn from_deg(direction_deg: f64) -> Result<(Axis, f64), Error> {
+        if !direction_deg.is_finite() {
+            return Err(Error::Number { name: "direction_deg", value: direction_deg, wanted: "a number" });
         }
+        // A pass and its reverse are one.
+        let turn = direction_deg.rem_euclid(180.0);
+        let turn = if turn > 135.0 { turn - 180.0 } else { turn };
+        let (axis, off) = if turn <= 45.0 { (Axis::X, turn) } else { (Axis::Y, 90.0 - turn) };
+        Ok((axis, off.to_radians().tan()))
     }
 
     /// (along, across) of a value per X and Y.
@@ -38,6 +39,24 @@ impl Axis {
             Axis::X => [u, v, z],
             Axis::Y => [v, u, z],
         }
+    }
+
+    /// Corners of the faces that reach into such a window, with the datum of [`Axis::heights`].
+    pub(super) fn outlines(self, surface: &dyn Surface, window: Window) -> Vec<Vec<[f64; 3]>> {
+        let step_mm = surface.lattice().step_mm;
+        let low = [window.column, window.row].map(|sample| sample as f64 * step_mm);
+        let high = [window.column_end(), window.row_end()].map(|sample| sample as f64 * step_mm);
+        let turned = |[u, v]: [f64; 2]| match self {
+            Axis::X => [u, v],
+            Axis::Y => [v, u],
+        };
+        let datum_mm = surface.top_mm();
+        let mut outlines = surface.outlines(turned(low), turned(high));
+        for corner in outlines.iter_mut().flatten() {
+            let [u, v] = turned([corner[0], corner[1]]);
+            *corner = [u, v, corner[2] - datum_mm];
+        }
+        outlines
     }
 
     /// Heights of a window that is counted along (columns) and across (rows) the passes.
@@ -72,43 +91,115 @@ impl Axis {
 
 /// The cutter locations of an operation: `count` positions along each pass, in whole units of the
 /// controller's grid, tile frame.
+///
+/// ```text
+///   across = passes[k] + round(slope (along + origin))         slope in -1 .. 1, 0 along an axis
+/// ```
+///
+/// so passes are one another shifted by whole units, and their positions half a unit from a line at most.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     pub along: Axis,
+    pub slope: f64,
     pub unit_mm: f64,
     /// First position along a pass, in units.
     pub start: i32,
-    /// Between positions, in units; never more than a sample step, unless one unit is.
+    /// Between positions, in units along the axis; never more than a sample step, unless one unit is.
     pub pitch: i32,
     /// Positions of a pass.
     pub count: usize,
     /// Where the passes lie across, in units, rising.
     pub passes: Vec<i32>,
+    /// Lowest and highest place across of a position that is cut.
+    across: [i32; 2],
+    /// The tile's corner along the passes, in units.
+    origin: i64,
 }
 
 impl Layout {
-    /// Covers the tile and `overrun_mm` (along, across) beyond it with passes `stepover` units apart.
-    pub(super) fn covering(site: &Site, along: Axis, stepover: i32, overrun_mm: [f64; 2]) -> Layout {
+    /// Covers the tile and `overrun_mm` (along, across) beyond it with passes `stepover` units apart across.
+    pub(super) fn covering(
+        site: &Site,
+        (along, slope): (Axis, f64),
+        stepover: i32,
+        overrun_mm: [f64; 2],
+    ) -> Layout {
         let lattice = site.surface.lattice();
         let unit = site.unit_mm;
         let (length_mm, breadth_mm) = along.split([lattice.width_mm, lattice.height_mm]);
         let (origin_u, origin_v) = along.split(site.origin_mm.map(|o| (o / unit).round() as i64));
         let pitch = ((lattice.step_mm / unit + 1e-9).floor() as i64).max(1);
-        let span = |step: i64, origin: i64, length_mm: f64, overrun_mm: f64| {
+        let span = |origin: i64, length_mm: f64, overrun_mm: f64| {
             let low = (-overrun_mm / unit).round() as i64 + origin;
-            let high = ((length_mm + overrun_mm) / unit).round() as i64 + origin;
-            (low.div_euclid(step), -((-high).div_euclid(step)))
+            (low, ((length_mm + overrun_mm) / unit).round() as i64 + origin)
         };
-        let (first, last) = span(pitch, origin_u, length_mm, overrun_mm[0]);
-        let (low, high) = span(i64::from(stepover), origin_v, breadth_mm, overrun_mm[1]);
+        let counted =
+            |step: i64, (low, high): (i64, i64)| (low.div_euclid(step), -((-high).div_euclid(step)));
+        let (first, last) = counted(pitch, span(origin_u, length_mm, overrun_mm[0]));
+        let across = span(origin_v, breadth_mm, overrun_mm[1]);
+        let risen = [first, last].map(|i| (slope * (i * pitch) as f64).round() as i64);
+        let lines = (across.0 - risen[0].max(risen[1]), across.1 - risen[0].min(risen[1]));
+        let (low, high) = counted(i64::from(stepover), lines);
+        // A straight pass is cut wherever it lies.
+        let inside = if slope == 0.0 { (i64::from(i32::MIN), i64::from(i32::MAX)) } else { across };
+        let within = |v: i64| (v - origin_v).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
         Layout {
             along,
+            slope,
             unit_mm: unit,
             start: (first * pitch - origin_u) as i32,
             pitch: pitch as i32,
             count: (last - first + 1) as usize,
             passes: (low..=high).map(|k| (k * i64::from(stepover) - origin_v) as i32).collect(),
+            across: [within(inside.0), within(inside.1)],
+            origin: origin_u,
         }
+    }
+
+    /// Place across of pass `k` at a place along it, in units.
+    pub(super) fn across(&self, k: usize, along: i32) -> i32 {
+        self.passes[k] + (self.slope * (i64::from(along) + self.origin) as f64).round() as i32
+    }
+
+    /// Whether position `i` of pass `k` is to be cut.
+    pub(super) fn covers(&self, k: usize, i: usize) -> bool {
+        (self.across[0]..=self.across[1]).contains(&self.across(k, self.at(i)))
+    }
+
+    /// The rectangle (along, across) in mm of positions `from ..= to` of some passes; None where none of them is cut.
+    pub(super) fn surroundings(
+        &self,
+        passes: &std::ops::Range<usize>,
+        from: usize,
+        to: usize,
+    ) -> Option<([f64; 2], [f64; 2])> {
+        let (u, v) = ([from, to].map(|i| self.at(i)), [passes.start, passes.end - 1]);
+        let ends = [(v[0], u[0]), (v[0], u[1]), (v[1], u[0]), (v[1], u[1])].map(|(k, u)| self.across(k, u));
+        let low = ends.into_iter().min()?.max(self.across[0]);
+        let high = ends.into_iter().max()?.min(self.across[1]);
+        let mm = |units: i32| f64::from(units) * self.unit_mm;
+        (low <= high).then(|| ([mm(u[0]), mm(low)], [mm(u[1]), mm(high)]))
+    }
+
+    /// Between positions along a pass in mm, as the cutter goes.
+    pub(super) fn length_mm(&self) -> f64 {
+        self.pitch_mm() * self.slope.hypot(1.0)
+    }
+
+    /// How far a move passes a position between its ends, in mm.
+    pub(super) fn aside_mm(&self) -> f64 {
+        if self.slope == 0.0 { 0.0 } else { self.unit_mm }
+    }
+
+    /// Between passes in mm, as the cutter meets them.
+    pub(super) fn stepover_mm(&self) -> Option<f64> {
+        let [first, second, ..] = self.passes[..] else { return None };
+        Some(f64::from(second - first) * self.unit_mm / self.slope.hypot(1.0))
+    }
+
+    /// Position `i` of pass `k`, along and across in mm.
+    pub(super) fn turned_mm(&self, k: usize, i: usize) -> [f64; 2] {
+        [self.at(i), self.across(k, self.at(i))].map(|units| f64::from(units) * self.unit_mm)
     }
 
     /// First position along a pass in mm.
@@ -121,14 +212,14 @@ impl Layout {
         f64::from(self.pitch) * self.unit_mm
     }
 
-    /// Where pass `k` lies across, in mm.
+    /// Where pass `k` lies across, in mm; a slanted one at the origin's along.
     pub fn across_mm(&self, k: usize) -> f64 {
         f64::from(self.passes[k]) * self.unit_mm
     }
 
     /// Position `i` of pass `k` in the tile's frame.
     pub(super) fn place_mm(&self, k: usize, i: usize) -> [f64; 2] {
-        let [x, y, _] = self.along.point(self.at(i), self.passes[k], 0);
+        let [x, y, _] = self.along.point(self.at(i), self.across(k, self.at(i)), 0);
         [f64::from(x) * self.unit_mm, f64::from(y) * self.unit_mm]
     }
 

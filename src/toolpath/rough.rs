@@ -11,7 +11,7 @@ use super::levels::{self, Profile};
 use super::pen::Pen;
 use super::strip::{Border, Strip, band_length};
 use super::{Axis, Error, Layout, Progress, Site, Toolpath, funnel};
-use crate::compensation;
+use crate::compensation::{self, Faces};
 use crate::cutter::Shape;
 
 /// How far a roughing profile may stand above what is left for it, in mm besides a grid unit: what is
@@ -82,7 +82,10 @@ pub fn rough(site: &Site, params: &Params, progress: Progress) -> Result<Toolpat
 
 fn layout(site: &Site, params: &Params) -> Result<(Layout, i32), Error> {
     site.validate(0.0)?;
-    let along = Axis::from_deg(params.direction_deg)?;
+    let (along, slope) = Axis::from_deg(params.direction_deg)?;
+    if slope != 0.0 {
+        return Err(Error::Direction { direction_deg: params.direction_deg });
+    }
     let radius = params.shape.radius_mm();
     if !(params.stock_to_leave_mm >= 0.0 && params.stock_to_leave_mm.is_finite()) {
         return Err(Error::StockToLeave { leave_mm: params.stock_to_leave_mm });
@@ -109,14 +112,14 @@ fn layout(site: &Site, params: &Params) -> Result<(Layout, i32), Error> {
         + site.surface.lattice().step_mm
         + site.unit_mm;
     site.validate(out_mm + stepover_mm + 2.0 * radius)?;
-    let layout = Layout::covering(site, along, stepover as i32, [out_mm; 2]);
+    let layout = Layout::covering(site, (along, slope), stepover as i32, [out_mm; 2]);
     Ok((layout, stepdown.min(f64::from(i32::MAX)) as i32))
 }
 
 fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) -> Result<Plan, Error> {
     let lattice = site.surface.lattice();
     let size_mm = layout.along.split([lattice.width_mm, lattice.height_mm]);
-    let cutter = Cutter::new(params.shape, lattice.step_mm, layout.pitch_mm(), site.budget)?;
+    let cutter = Cutter::new(params.shape, lattice.step_mm, layout.pitch_mm(), 0.0, site.budget)?;
     let stepover_mm = match layout.passes[..] {
         [first, second, ..] => f64::from(second - first) * site.unit_mm,
         _ => 0.0,
@@ -133,9 +136,10 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
         let last = first + band_length(&layout, first, lattice.step_mm, reach_mm) - 1;
         let low_mm = layout.across_mm(first) - stepover_mm;
         let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), reach_mm)?;
-        let envelopes = cutter.widened(&strip, &layout, first..last + 1);
+        let envelopes = cutter.widened(&strip, &cutter.faces(&strip), &layout, first..last + 1);
         let middles = (first..last + 1).map(|k| layout.across_mm(k) - 0.5 * stepover_mm);
-        let between = cutter.rows(&strip, &between, &layout, middles);
+        let faces = Faces::new(&strip.outlines, &between);
+        let between = cutter.rows(&strip, &between, &faces, &layout, middles);
         let band: Vec<Row> = (first..last + 1)
             .into_par_iter()
             .zip(envelopes)

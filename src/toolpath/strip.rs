@@ -17,7 +17,11 @@ const BLOCK: usize = 4;
 /// Heights in the frame of the passes: columns along, rows across.
 pub(super) struct Strip {
     pub(super) heights: Heights,
+    /// Corners of the planar faces among them, with their datum; none where there are only samples.
+    pub(super) outlines: Vec<Vec<[f64; 3]>>,
     step_mm: f64,
+    /// How far a face may stand above its samples.
+    pub(super) missed_mm: f64,
     /// Maximum over BLOCK rows of each column; -inf where there is no data.
     blocks: Vec<f32>,
 }
@@ -39,27 +43,37 @@ impl Strip {
         high_mm: f64,
         reach_mm: f64,
     ) -> Result<Strip, Error> {
+        let start_mm = layout.start_mm();
+        let end_mm = start_mm + layout.count as f64 * layout.pitch_mm();
+        let low_mm = [start_mm - reach_mm, low_mm - reach_mm];
+        Strip::around(surface, layout.along, low_mm, [end_mm + reach_mm, high_mm + reach_mm])
+    }
+
+    /// Reads a rectangle (along, across).
+    pub(super) fn around(
+        surface: &dyn Surface,
+        along: Axis,
+        low_mm: [f64; 2],
+        high_mm: [f64; 2],
+    ) -> Result<Strip, Error> {
         let step_mm = surface.lattice().step_mm;
-        let column = ((layout.start_mm() - reach_mm) / step_mm).floor() as i64 - 1;
-        let end_mm = layout.start_mm() + layout.count as f64 * layout.pitch_mm();
-        let column_end = ((end_mm + reach_mm) / step_mm).ceil() as i64 + 1;
-        let row = ((low_mm - reach_mm) / step_mm).floor() as i64 - 1;
-        let row_end = ((high_mm + reach_mm) / step_mm).ceil() as i64 + 1;
+        let [column, row] = low_mm.map(|mm| (mm / step_mm).floor() as i64 - 1);
+        let [column_end, row_end] = high_mm.map(|mm| (mm / step_mm).ceil() as i64 + 1);
         let window =
             Window { column, row, columns: (column_end - column) as usize, rows: (row_end - row) as usize };
         if window.samples() > MOST_SAMPLES {
             return Err(Error::Band { samples: window.samples(), most: MOST_SAMPLES });
         }
-        Ok(Strip::new(layout.along.heights(surface, window)?, step_mm))
-    }
-
-    pub(super) fn new(heights: Heights, step_mm: f64) -> Strip {
+        let heights = along.heights(surface, window)?;
+        let outlines = along.outlines(surface, window);
+        let [steep_x, steep_y] = surface.steepest();
+        let missed_mm = if outlines.is_empty() { 0.0 } else { step_mm * steep_x.hypot(steep_y) };
         let columns = heights.window.columns;
         let mut blocks = vec![f32::NEG_INFINITY; columns * heights.window.rows.div_ceil(BLOCK)];
         for (rows, block) in heights.z_mm.chunks(BLOCK * columns).zip(blocks.chunks_exact_mut(columns)) {
             rows.chunks_exact(columns).for_each(|row| raise(block, row));
         }
-        Strip { heights, step_mm, blocks }
+        Ok(Strip { heights, outlines, step_mm, missed_mm, blocks })
     }
 
     /// For a pass at `across_mm`: the highest sample of the square `reach_mm` around each column.
@@ -80,7 +94,12 @@ impl Strip {
             row += rows;
         }
         let around = (reach_mm / self.step_mm).ceil() as usize + 1;
-        Ceiling { z_mm: sliding(&z_mm, around, f32::max), first: window.column, step_mm: self.step_mm }
+        Ceiling {
+            z_mm: sliding(&z_mm, around, f32::max),
+            first: window.column,
+            step_mm: self.step_mm,
+            missed_mm: self.missed_mm,
+        }
     }
 }
 
@@ -96,13 +115,14 @@ pub(super) struct Ceiling {
     z_mm: Vec<f32>,
     first: i64,
     step_mm: f64,
+    missed_mm: f64,
 }
 
 impl Ceiling {
-    /// The highest sample in reach of a place along the pass.
+    /// The highest point in reach of a place along the pass.
     pub(super) fn at(&self, along_mm: f64) -> f64 {
         let column = (along_mm / self.step_mm).floor() as i64 - self.first;
-        f64::from(self.z_mm[column.clamp(0, self.z_mm.len() as i64 - 1) as usize])
+        f64::from(self.z_mm[column.clamp(0, self.z_mm.len() as i64 - 1) as usize]) + self.missed_mm
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Relief {
     pub top_mm: f64,
     pub bottom_mm: f64,
     pub steepest: [f64; 2],
+    /// Corners of its faces, in its own z; none where only the samples are known.
+    pub outlines: Vec<Vec<[f64; 3]>>,
 }
 
 impl Relief {
@@ -33,7 +35,7 @@ impl Relief {
         }
         let fold = |f: fn(f32, f32) -> f32| z_mm.iter().copied().fold(f32::NAN, f);
         let (top_mm, bottom_mm) = (f64::from(fold(f32::max)), f64::from(fold(f32::min)));
-        Relief { lattice, z_mm, top_mm, bottom_mm, steepest }
+        Relief { lattice, z_mm, top_mm, bottom_mm, steepest, outlines: Vec::new() }
     }
 }
 
@@ -56,6 +58,9 @@ impl Surface for Relief {
             z_mm: self.z_mm.iter().map(|&z| (f64::from(z) - datum_mm) as f32).collect(),
         };
         Ok(whole.crop(window))
+    }
+    fn outlines(&self, _low_mm: [f64; 2], _high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
+        self.outlines.clone()
     }
 }
 
