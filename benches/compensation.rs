@@ -1,110 +1,232 @@
-//! `cargo bench --bench compensation [-- SIDE]`: one thread, designed domes of SIDE x SIDE samples
-//! of 10 um; times as multiples of a plain copy of the heights and of the naive loop, all of one
-//! run.
+//! `cargo bench --bench compensation [-- SIDE]`: designed domes of SIDE x SIDE samples of 10 um,
+//! one thread unless said, all ratios of one run: processor time where Linux tells it. OpenCV,
+//! SciPy and OpenCAMLib are asked by benches/peers.py where python3 has them.
 
 #[allow(dead_code)]
 #[path = "../tests/compensation/surfaces.rs"]
 mod surfaces;
 
-use screenmill::compensation::{self, Profile, RowTarget};
+use npyz::WriterBuilder;
+use screenmill::compensation::{self, Profile, RowTarget, Way};
 use screenmill::grid::{Heights, Window};
 use std::hint::black_box;
+use std::path::Path;
+use std::process::Command;
 use std::time::Instant;
 use surfaces::STEP_MM;
 
-/// Nanoseconds of the median of three runs.
-fn nanoseconds(mut run: impl FnMut()) -> f64 {
-    let mut times: Vec<f64> = (0..3)
-        .map(|_| {
-            let start = Instant::now();
-            run();
-            start.elapsed().as_secs_f64() * 1e9
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    times[1]
+const RADII: [usize; 5] = [10, 25, 50, 100, 150];
+
+/// What this thread has run, in ns: other programs on the machine do not show as much as in wall
+/// time.
+fn spent_ns(since: Instant) -> f64 {
+    std::fs::read_to_string("/proc/thread-self/schedstat")
+        .ok()
+        .and_then(|text| text.split(' ').next()?.parse().ok())
+        .unwrap_or_else(|| since.elapsed().as_secs_f64() * 1e9)
+}
+
+/// The least of some runs, in ns.
+fn nanoseconds(runs: usize, mut run: impl FnMut()) -> f64 {
+    let origin = Instant::now();
+    (0..runs).fold(f64::INFINITY, |least, _| {
+        let start = spent_ns(origin);
+        run();
+        least.min(spent_ns(origin) - start)
+    })
+}
+
+fn ball(radius: usize) -> Profile {
+    cutter(&format!("ball:{}", 2.0 * radius as f64 * STEP_MM))
+}
+
+fn cutter(text: &str) -> Profile {
+    Profile::new(text.parse().expect("a cutter"), STEP_MM, 0.0).expect("a profile")
 }
 
 fn naive_ns_per_sample(h: &Heights, profile: &Profile) -> f64 {
-    let radius = profile.radius();
     let reach = profile.reach() as i64;
     let mut taps = Vec::new();
     for dy in -reach..=reach {
         for dx in -reach..=reach {
-            let d = ((dx * dx + dy * dy) as f64).sqrt();
-            if d <= radius {
-                taps.push((dx, dy, profile.s_mm(d * STEP_MM).unwrap_or(0.0) as f32));
+            let d_mm = ((dx * dx + dy * dy) as f64).sqrt() * STEP_MM;
+            if let Some(s_mm) = profile.s_mm(d_mm) {
+                taps.push((dx, dy, s_mm as f32));
             }
         }
     }
     let side = 24i64;
-    let start = Instant::now();
-    let mut sum = 0.0;
-    for row in reach..reach + side {
-        for column in reach..reach + side {
-            let mut best = f32::MIN;
-            for &(dx, dy, s) in &taps {
-                best = best.max(h.row(row + dy)[(column + dx) as usize] + s);
+    let ns = nanoseconds(1, || {
+        let mut sum = 0.0;
+        for row in reach..reach + side {
+            for column in reach..reach + side {
+                let mut best = f32::MIN;
+                for &(dx, dy, s) in &taps {
+                    best = best.max(h.row(row + dy)[(column + dx) as usize] + s);
+                }
+                sum += best;
             }
-            sum += best;
+        }
+        black_box(sum);
+    });
+    ns / (side * side) as f64
+}
+
+/// The numbers that benches/peers.py prints; None where a package is missing.
+fn peers(arguments: &[&str]) -> Option<Vec<f64>> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers.py");
+    let python = std::env::var("SCREENMILL_PYTHON").unwrap_or_else(|_| "python3".into());
+    let output = Command::new(python).arg(script).args(arguments).output().ok()?;
+    let said = String::from_utf8_lossy(&output.stdout);
+    said.split_whitespace()
+        .map(|word| word.parse().ok())
+        .collect::<Option<Vec<f64>>>()
+        .filter(|n| !n.is_empty())
+}
+
+fn write(h: &Heights, path: &Path) {
+    let file = std::fs::File::create(path).expect("a scratch file");
+    let shape = [h.window.rows as u64, h.window.columns as u64];
+    let options = npyz::WriteOptions::new().default_dtype().shape(&shape);
+    let mut writer = options.writer(std::io::BufWriter::new(file)).begin_nd().expect("a header");
+    writer.extend(h.z_mm.iter().copied()).expect("heights");
+    writer.finish().expect("a file");
+}
+
+fn line(name: &str, values: impl IntoIterator<Item = Option<f64>>, digits: usize) {
+    print!("| {name} |");
+    for value in values {
+        match value {
+            Some(value) => print!(" {value:.digits$} |"),
+            None => print!(" - |"),
         }
     }
-    black_box(sum);
-    start.elapsed().as_secs_f64() * 1e9 / (side * side) as f64
+    println!();
 }
 
 fn main() {
     let side = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(3000);
-    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("the first pool of the program");
-    let facets = surfaces::from(side, side, surfaces::facets(side, side, 400, 7));
+    // This thread is the pool, so that its clock tells all.
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .use_current_thread()
+        .build_global()
+        .expect("the first pool of the program");
+    let h = surfaces::from(side, side, surfaces::facets(side, side, 400, 7));
     let mut random = surfaces::Random(3);
-    let noise = surfaces::from(side, side, |_, _| 70.0 * random.next());
+    let noise = surfaces::from(side, 400.min(side), |_, _| 70.0 * random.next());
     let samples = (side * side) as f64;
-    let window = facets.window;
-    let copy = nanoseconds(|| drop(black_box(facets.z_mm.clone()))) / samples;
-    println!("{side} x {side} samples, one thread; a copy takes {copy:.2} ns a sample");
-    println!("surface cutter        what          ns/sample   x copy   naive/this");
-    let report = |surface: &str, cutter: &str, what: &str, ns: f64, naive: f64| {
-        println!("{surface:7} {cutter:13} {what:13} {ns:9.2} {:8.1} {:12.0}", ns / copy, naive / ns);
-    };
-    for text in ["ball:0.2", "ball:0.5", "ball:1", "ball:2", "ball:3"] {
-        let profile = Profile::new(text.parse().expect("a cutter"), STEP_MM, 0.0).expect("a profile");
-        let naive = naive_ns_per_sample(&facets, &profile);
-        let cl = compensation::cutter_location(&facets, &profile, window);
-        let time = |what: &str, run: &mut dyn FnMut()| {
-            report("facets", text, what, nanoseconds(run) / samples, naive);
+    let window = h.window;
+    let mut to = h.z_mm.clone();
+    let copy = nanoseconds(9, || {
+        to.copy_from_slice(black_box(&h.z_mm));
+        black_box(&to);
+    }) / samples;
+    drop(to);
+    let (mut cl, mut fifth, mut closing, mut flat) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut naive, mut known) = (Vec::new(), Vec::new());
+    for radius in RADII {
+        let profile = ball(radius);
+        let per_sample =
+            |runs: usize, run: &dyn Fn() -> Heights| nanoseconds(runs, || drop(black_box(run()))) / samples;
+        cl.push(per_sample(3, &|| compensation::cutter_location(&h, &profile, window)));
+        fifth.push(per_sample(3, &|| compensation::cutter_location_rows(&h, &profile, window, 5)));
+        closing.push(per_sample(2, &|| compensation::closing(&h, &profile, window)));
+        naive.push(naive_ns_per_sample(&h, &profile));
+        let disc = cutter(&format!("flat:{}", 2.0 * radius as f64 * STEP_MM));
+        flat.push(per_sample(1, &|| compensation::cutter_location(&h, &disc, window)));
+        let by = |way| {
+            nanoseconds(2, || {
+                drop(black_box(compensation::cutter_location_by(&noise, &profile, noise.window, way)))
+            })
         };
-        time("CL", &mut || drop(black_box(compensation::cutter_location(&facets, &profile, window))));
-        time("CL every 5", &mut || {
-            drop(black_box(compensation::cutter_location_rows(&facets, &profile, window, 5)))
-        });
-        time("erosion", &mut || drop(black_box(compensation::erode(&cl, &profile, window))));
-        let part = Window { rows: 400, ..window };
-        let ns = nanoseconds(|| drop(black_box(compensation::cutter_location(&noise, &profile, part))));
-        report("noise", text, "CL", ns / part.samples() as f64, naive);
+        known.push(by(Way::Known) / by(Way::EveryTap).min(by(Way::Contacts)));
     }
-    for text in ["flat:0.5", "flat:1", "flat:3", "bull:2:0.2", "vee:60:0.1:1", "taper:0.2:10:1"] {
-        let profile = Profile::new(text.parse().expect("a cutter"), STEP_MM, 0.0).expect("a profile");
-        let naive = naive_ns_per_sample(&facets, &profile);
-        let part = Window { rows: window.rows.min(800), ..window };
-        let ns = nanoseconds(|| drop(black_box(compensation::cutter_location(&facets, &profile, part))));
-        report("facets", text, "CL", ns / part.samples() as f64, naive);
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let heights = scratch.path().join("heights.npy");
+    write(&h, &heights);
+    let heights = heights.display().to_string();
+    let radii = RADII.map(|radius| radius.to_string());
+    let words: Vec<&str> = ["opencv", &heights].into_iter().chain(radii.iter().map(String::as_str)).collect();
+    let opencv = peers(&words);
+    let opencv = |i: usize| opencv.as_ref().and_then(|ns| ns.get(2 * i + 1)).copied();
+
+    println!("{side} x {side} samples; a copy takes {copy:.2} ns a sample\n");
+    println!("| R in samples | 10 | 25 | 50 | 100 | 150 |\n|---|---|---|---|---|---|");
+    line("ball CL, ns a sample", cl.iter().map(|ns| Some(*ns)), 1);
+    line("ball CL, times a copy", cl.iter().map(|ns| Some(ns / copy)), 1);
+    line("naive loop, times ball CL", naive.iter().zip(&cl).map(|(n, ns)| Some(n / ns)), 0);
+    line("flat disc, ns a sample", flat.iter().map(|ns| Some(*ns)), 1);
+    line("OpenCV's dilate, times flat disc", flat.iter().enumerate().map(|(i, ns)| Some(opencv(i)? / ns)), 1);
+    line("every 5th row, part of ball CL", fifth.iter().zip(&cl).map(|(f, ns)| Some(f / ns)), 2);
+    line("closing, times ball CL", closing.iter().zip(&cl).map(|(c, ns)| Some(c / ns)), 2);
+    line("white noise, times the better way", known.into_iter().map(Some), 2);
+    println!();
+    if let Some(scipy) = peers(&["scipy", &heights, "25"]) {
+        println!("SciPy's grey_dilation, R = 25: {:.0} times ball CL", scipy[1] / cl[1]);
     }
-    let profile = Profile::new("ball:1".parse().expect("a cutter"), STEP_MM, 0.0).expect("a profile");
-    let naive = naive_ns_per_sample(&facets, &profile);
-    let width_mm = side as f64 * STEP_MM;
+    drops(scratch.path());
+    two_threads(&h);
+    others(&h);
+}
+
+/// Against OpenCAMLib's path drop-cutter, on a designed tile of 20 x 20 mm as triangles.
+fn drops(scratch: &Path) {
+    let binary = env!("CARGO_BIN_EXE_screenmill");
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/theatre.toml");
+    let (stl, npz) = (scratch.join("tile.stl"), scratch.join("tile.npz"));
+    let mut design = Command::new(binary);
+    design.arg("design").arg(scene).args(["--cells", "322", "148", "327", "153", "--quiet"]);
+    design.arg("--out").arg(npz).arg("--stl").arg(&stl);
+    let made = design.output().is_ok_and(|output| output.status.success());
+    if let Some(rates) = made.then(|| peers(&["opencamlib", binary, &stl.display().to_string()])).flatten() {
+        println!(
+            "20 x 20 mm of triangles, exact, ball:0.5: {:.2} million cutter locations a processor second, OpenCAMLib {:.1} thousand: {:.0} times",
+            rates[1] / 1e6,
+            rates[0] / 1e3,
+            rates[1] / rates[0]
+        );
+    }
+}
+
+fn two_threads(h: &Heights) {
+    let profile = ball(100);
+    let wall = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        (0..3).fold(f64::INFINITY, |least, _| {
+            let start = Instant::now();
+            pool.install(|| drop(black_box(compensation::cutter_location(h, &profile, h.window))));
+            least.min(start.elapsed().as_secs_f64())
+        })
+    };
+    println!("two threads, ball CL, R = 100: {:.2} times one, wall time", wall(1) / wall(2));
+}
+
+/// Cutters and calls that the table leaves out, in ns a sample or position.
+fn others(h: &Heights) {
+    let window = h.window;
+    let part = Window { rows: window.rows.min(400), ..window };
+    for text in ["bull:2:0.2", "vee:60:0.1:1", "taper:0.2:10:1"] {
+        let profile = cutter(text);
+        let ns = nanoseconds(1, || drop(black_box(compensation::cutter_location(h, &profile, part))));
+        println!("{text}: CL {:.0} ns a sample", ns / part.samples() as f64);
+    }
+    let profile = ball(50);
+    let width_mm = window.columns as f64 * STEP_MM;
     let targets: Vec<RowTarget> = (0..(width_mm / 0.0475) as usize)
-        .map(|i| RowTarget { x0_mm: 0.005, y_mm: 0.0475 * i as f64, count: side })
+        .map(|i| RowTarget { x0_mm: 0.005, y_mm: 0.0475 * i as f64, count: window.columns })
         .collect();
-    let positions = (targets.len() * side) as f64;
     let mut rows = Vec::new();
-    let ns = nanoseconds(|| rows = compensation::rows(&facets, &profile, &targets));
-    report("facets", "ball:1", "rows off grid", ns / positions, naive);
+    let ns = nanoseconds(2, || rows = compensation::rows(h, &profile, &targets));
+    println!(
+        "ball:1, rows off the lattice: {:.1} ns a position",
+        ns / (targets.len() * window.columns) as f64
+    );
     let passes: Vec<compensation::RowPass> = targets
         .iter()
         .zip(&rows)
         .map(|(t, z_mm)| compensation::RowPass { x0_mm: t.x0_mm, y_mm: t.y_mm, z_mm })
         .collect();
-    let ns = nanoseconds(|| drop(black_box(compensation::machined_by_rows(&passes, &profile, window))));
-    report("facets", "ball:1", "under passes", ns / samples, naive);
+    let ns = nanoseconds(2, || drop(black_box(compensation::machined_by_rows(&passes, &profile, window))));
+    println!("ball:1, surface under these rows: {:.1} ns a sample", ns / window.samples() as f64);
 }

@@ -17,6 +17,10 @@
 //! Lengths are millimetres, feeds mm/min, times seconds, spindle speeds rpm; a scene is in
 //! metres. The frame is drawn in [`grid`].
 
+// Surfaces of tests/ are those of unit tests too.
+#[cfg(test)]
+extern crate self as screenmill;
+
 pub mod catalogue;
 pub mod cutter;
 pub mod grid;

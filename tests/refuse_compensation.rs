@@ -58,3 +58,38 @@ fn every_case_is_refused_as_its_file_says() {
         assert_eq!(fs::read_dir(scratch.path()).expect("a folder").count(), before, "{name} left a file");
     }
 }
+
+/// A file may announce rows so wide that no band of them can be held: refused with the figures
+/// before anything is taken. (Its text depends on the machine's memory, so it is no file's case.)
+#[test]
+fn more_memory_than_there_is_is_refused_with_the_figure() {
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let part = scratch.path().join("part.npy");
+    write_part(&part, "0 0 0");
+    let bytes = fs::read(&part).expect("a file");
+    let columns = 100_000_000u64;
+    let header = bytes.len() - 12;
+    let start = bytes[..header].windows(6).position(|w| w == b"'shape").expect("a shape");
+    let shape = format!("'shape': (1, {columns}), }}");
+    let mut head = bytes[..header].to_vec();
+    assert!(start + shape.len() < header);
+    head[start..start + shape.len()].copy_from_slice(shape.as_bytes());
+    head[start + shape.len()..header - 1].fill(b' ');
+    fs::write(&part, &head).expect("a scratch file");
+    let file = fs::OpenOptions::new().write(true).open(&part).expect("a file");
+    file.set_len(header as u64 + 4 * columns).expect("a sparse file");
+    let closing = scratch.path().join("closing.npy");
+    let done = Command::cargo_bin("screenmill")
+        .expect("the program")
+        .arg("compensate")
+        .arg(&part)
+        .args(["--cutter", "ball:3", "--pixel-mm", "0.01", "--quiet", "--closing"])
+        .arg(&closing)
+        .output()
+        .expect("a run");
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(2), "{said}");
+    assert!(said.starts_with("error: 100000000 columns under cutter ball:3 take 4"), "{said}");
+    assert!(said.contains("GB are free; hint: "), "{said}");
+    assert!(!closing.exists());
+}

@@ -53,6 +53,16 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     if with_closing {
         profile.covers_between(every)?;
     }
+    let needed = compensation::stream_bytes(&lattice, &profile, with_closing);
+    if let Some(there) = free_bytes().filter(|there| needed > *there) {
+        return Err(compensation::Error::Memory {
+            columns: lattice.columns,
+            cutter: arguments.cutter.to_string(),
+            needed_gb: needed as f64 / 1e9,
+            there_gb: there as f64 / 1e9,
+        }
+        .into());
+    }
     let mut files = Files::create(arguments, surface.as_ref(), &lattice)?;
     let mut found = Found::default();
     let progress = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new(lattice.rows as u64) };
@@ -120,6 +130,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         }
     }
     Ok(Outcome::Within)
+}
+
+/// Memory that a program may still take, where the system tells.
+fn free_bytes() -> Option<u64> {
+    let told = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = told.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| 1024 * kilobytes)
 }
 
 /// What was found on the way.

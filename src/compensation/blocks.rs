@@ -97,6 +97,125 @@ fn high<V: Vectors>(slope: V::Group, z_low: V::Group, z_high: V::Group) -> V::Gr
     V::greater(V::multiply(slope, z_low), V::multiply(slope, z_high))
 }
 
+/// Boxes of a group of samples.
+struct Sides<V: Vectors> {
+    x_low: V::Group,
+    x_high: V::Group,
+    y_low: V::Group,
+    y_high: V::Group,
+}
+
+/// What sweeps take of a ball.
+struct Sweeper<V: Vectors> {
+    half: V::Group,
+    start: V::Group,
+    /// R^2, so that rounding makes no root larger or smaller than it may be.
+    square_less: V::Group,
+    square_more: V::Group,
+}
+
+impl<V: Vectors> Sweeper<V> {
+    #[inline(always)]
+    fn new(ball: &Ball) -> Sweeper<V> {
+        let square = ball.radius * ball.radius;
+        Sweeper {
+            half: V::splat((0.5 + ball.room()) as f32),
+            start: V::splat((1.0 + ball.room()) as f32),
+            square_less: V::splat((square * (1.0 - 1e-6)) as f32),
+            square_more: V::splat((square * (1.0 + 1e-6)) as f32),
+        }
+    }
+}
+
+/// One of the four bounds: the mean slope g of the surface to a neighbour.
+struct Slope<V: Vectors> {
+    rising: u16,
+    /// g / sqrt(1 + g^2), on the safe side.
+    sine: V::Group,
+    /// (1 + g^2) / 4.
+    quarter: V::Group,
+}
+
+impl<V: Vectors> Slope<V> {
+    #[inline(always)]
+    fn new(g: V::Group) -> Slope<V> {
+        // Squares stay finite.
+        let g = V::less(V::greater(g, V::splat(-1e15)), V::splat(1e15));
+        let square = V::add(V::multiply(g, g), V::splat(1.0));
+        let rising = V::at_least(g, V::splat(0.0));
+        let safe =
+            V::choose(rising, V::splat(1.0 - 2.0 * V::INVERSE_ERROR), V::splat(1.0 + 2.0 * V::INVERSE_ERROR));
+        Slope {
+            rising,
+            sine: V::multiply(V::multiply(g, safe), V::inverse_root(square)),
+            quarter: V::multiply(square, V::splat(0.25)),
+        }
+    }
+
+    /// The least offset along the axis, where the circle that the ball is there has a squared
+    /// radius within `low ..= high`: a chord from d to d + 1 of slope g on a circle of radius C
+    /// has its middle at sin sqrt(C^2 - (1 + g^2) / 4).
+    #[inline(always)]
+    fn bound(&self, low: V::Group, high: V::Group, cap: V::Group, half: V::Group) -> V::Group {
+        let square = V::choose(self.rising, V::subtract(low, self.quarter), high);
+        let bound = V::subtract(V::multiply(self.sine, root::<V>(square)), half);
+        // No chord is so steep.
+        let never = self.rising & V::at_least(V::multiply(self.quarter, V::splat(0.9999)), high);
+        let bound = V::choose(never, V::splat(1e9), bound);
+        V::less(bound, cap)
+    }
+}
+
+/// sqrt, relatively within the error of [`Vectors::inverse_root`]; 0 of what is negative.
+#[inline(always)]
+fn root<V: Vectors>(square: V::Group) -> V::Group {
+    let square = V::greater(square, V::splat(1e-12));
+    V::multiply(square, V::inverse_root(square))
+}
+
+struct Slopes<V: Vectors> {
+    x_next: Slope<V>,
+    x_before: Slope<V>,
+    y_next: Slope<V>,
+    y_before: Slope<V>,
+}
+
+impl<V: Vectors> Slopes<V> {
+    #[inline(always)]
+    fn new(x_next: V::Group, x_before: V::Group, y_next: V::Group, y_before: V::Group) -> Slopes<V> {
+        let zero = V::splat(0.0);
+        Slopes {
+            x_next: Slope::new(x_next),
+            x_before: Slope::new(V::subtract(zero, x_before)),
+            y_next: Slope::new(y_next),
+            y_before: Slope::new(V::subtract(zero, y_before)),
+        }
+    }
+
+    /// Tightens boxes once, first in x by what they are in y.
+    #[inline(always)]
+    fn sweep(&self, at: &mut Sides<V>, of: &Sweeper<V>) {
+        let zero = V::splat(0.0);
+        let (low, high, cap) = circle::<V>(at.y_low, at.y_high, of);
+        at.x_low = V::greater(at.x_low, self.x_next.bound(low, high, cap, of.half));
+        at.x_high = V::less(at.x_high, V::subtract(zero, self.x_before.bound(low, high, cap, of.half)));
+        let (low, high, cap) = circle::<V>(at.x_low, at.x_high, of);
+        at.y_low = V::greater(at.y_low, self.y_next.bound(low, high, cap, of.half));
+        at.y_high = V::less(at.y_high, V::subtract(zero, self.y_before.bound(low, high, cap, of.half)));
+    }
+}
+
+/// The ball cut along one axis at offsets `low ..= high` of the other: bounds on the square of the
+/// circle's radius, and the farthest offset at which the next sample is surely in the circle.
+#[inline(always)]
+fn circle<V: Vectors>(low: V::Group, high: V::Group, of: &Sweeper<V>) -> (V::Group, V::Group, V::Group) {
+    let (far, near) = (farthest::<V>(low, high), nearest::<V>(low, high));
+    let least = V::subtract(of.square_less, V::multiply(far, far));
+    let most = V::subtract(of.square_more, V::multiply(near, near));
+    let radius = V::multiply(root::<V>(least), V::splat(1.0 - V::INVERSE_ERROR));
+    (least, most, V::subtract(radius, of.start))
+}
+
 /// What is the same for all samples of moderate slope under one ball.
 ///
 /// Where all slopes are at most `steepest`, the offset d of a contact has |dx| <= R sin + 1 (the
@@ -114,8 +233,8 @@ pub(super) struct Moderate {
     /// Half a sample, and room for rounding.
     half: f32,
     per_step: f32,
-    /// Whether the spread is so wide that bounds on Z from the box itself are worth their roots.
-    small: bool,
+    /// How often boxes are tightened; the spread of small balls is wide.
+    sweeps: usize,
 }
 
 /// The widest slope that is called moderate.
@@ -141,7 +260,7 @@ impl Moderate {
             radius: radius as f32,
             half: (0.5 + ball.room()) as f32,
             per_step: (1.0 / ball.step_mm) as f32,
-            small: radius < 60.0,
+            sweeps: if radius < 60.0 { 2 } else { 1 },
         })
     }
 }
@@ -178,17 +297,15 @@ impl<V: Vectors> Boxes<V> {
 
     /// Fills in the block's; `whole` rounds boxes to the lattice inwards.
     #[inline(always)]
-    pub fn fill(&mut self, field: &Field, block: Block, of: &Moderate, whole: bool) {
+    pub fn fill(&mut self, field: &Field, block: Block, ball: &Ball, of: &Moderate, whole: bool) {
         let i = PAD + block.first;
         self.any_steep = 0;
         let scale = V::splat(of.per_step);
         let steepest = V::splat(of.steepest);
         let spread = V::splat(of.spread);
-        let zero = V::splat(0.0);
         let one = V::splat(1.0);
         let half = V::splat(of.half);
-        let more = V::splat(of.half + 1.0);
-        let square = V::splat(of.radius * of.radius);
+        let sweeper = Sweeper::<V>::new(ball);
         let lower = V::splat(of.radius * (1.0 - V::INVERSE_ERROR));
         let upper = V::splat(of.radius * (1.0 + V::INVERSE_ERROR));
         let mut z = V::load(group(field.row(block.a), i));
@@ -219,27 +336,19 @@ impl<V: Vectors> Boxes<V> {
             let y_far = farthest::<V>(V::subtract(y_next, spread), V::add(y_before, spread));
             let q_most = V::add(squares::<V>(x_far, y_far), one);
             let q_least = V::add(squares::<V>(x_near, y_near), one);
-            let mut z_low = V::multiply(lower, V::inverse_root(q_most));
-            let mut z_high = V::multiply(upper, V::inverse_root(q_least));
-            if of.small {
-                // What the box says of |d|, there and one sample on.
-                for _ in 0..2 {
-                    let x_low = V::subtract(low::<V>(x_next, z_low, z_high), more);
-                    let x_high = V::add(high::<V>(x_before, z_low, z_high), more);
-                    let y_low = V::subtract(low::<V>(y_next, z_low, z_high), more);
-                    let y_high = V::add(high::<V>(y_before, z_low, z_high), more);
-                    let most = squares::<V>(farthest::<V>(x_low, x_high), farthest::<V>(y_low, y_high));
-                    let least = squares::<V>(nearest::<V>(x_low, x_high), nearest::<V>(y_low, y_high));
-                    let z = V::square_root(V::greater(V::subtract(square, most), zero));
-                    z_low = V::greater(z_low, z);
-                    let z = V::square_root(V::greater(V::subtract(square, least), zero));
-                    z_high = V::less(z_high, z);
-                }
+            let z_low = V::multiply(lower, V::inverse_root(q_most));
+            let z_high = V::multiply(upper, V::inverse_root(q_least));
+            let mut at = Sides::<V> {
+                x_low: V::subtract(low::<V>(x_next, z_low, z_high), half),
+                x_high: V::add(high::<V>(x_before, z_low, z_high), half),
+                y_low: V::subtract(low::<V>(y_next, z_low, z_high), half),
+                y_high: V::add(high::<V>(y_before, z_low, z_high), half),
+            };
+            let slopes = Slopes::<V>::new(x_next, x_before, y_next, y_before);
+            for _ in 0..of.sweeps {
+                slopes.sweep(&mut at, &sweeper);
             }
-            let mut x_low = V::subtract(low::<V>(x_next, z_low, z_high), half);
-            let mut x_high = V::add(high::<V>(x_before, z_low, z_high), half);
-            let mut y_low = V::subtract(low::<V>(y_next, z_low, z_high), half);
-            let mut y_high = V::add(high::<V>(y_before, z_low, z_high), half);
+            let Sides { mut x_low, mut x_high, mut y_low, mut y_high } = at;
             if whole {
                 (x_low, x_high) = (V::ceil(x_low), V::floor(x_high));
                 (y_low, y_high) = (V::ceil(y_low), V::floor(y_high));
@@ -270,13 +379,8 @@ impl<V: Vectors> Boxes<V> {
         let scale = V::splat((1.0 / ball.step_mm) as f32);
         let zero = V::splat(0.0);
         let radius = V::splat(ball.radius as f32);
-        let half = V::splat((0.5 + ball.room()) as f32);
         let start = V::splat((1.0 + ball.room()) as f32);
-        // Rounding makes no root larger or smaller than it may be.
-        let square_more = V::splat((ball.radius * ball.radius * (1.0 + 1e-6)) as f32);
-        let square_less = V::splat((ball.radius * ball.radius * (1.0 - 1e-6)) as f32);
-        let rim = V::splat((0.5 * ball.radius + 1.0) as f32);
-        let sag = V::splat((4.0 / (3.0 * ball.radius)) as f32);
+        let sweeper = Sweeper::<V>::new(ball);
         for r in 0..block.rows {
             if self.steep[r] == 0 {
                 continue;
@@ -290,37 +394,19 @@ impl<V: Vectors> Boxes<V> {
             let y_next = V::multiply(V::subtract(above, z), scale);
             let y_before = V::multiply(V::subtract(z, below), scale);
             let low = V::subtract(V::less(V::multiply(x_next, radius), zero), start);
-            let mut x_low = V::greater(low, V::subtract(zero, radius));
+            let x_low = V::greater(low, V::subtract(zero, radius));
             let high = V::add(V::greater(V::multiply(x_before, radius), zero), start);
-            let mut x_high = V::less(high, radius);
+            let x_high = V::less(high, radius);
             let low = V::subtract(V::less(V::multiply(y_next, radius), zero), start);
-            let mut y_low = V::greater(low, V::subtract(zero, radius));
+            let y_low = V::greater(low, V::subtract(zero, radius));
             let high = V::add(V::greater(V::multiply(y_before, radius), zero), start);
-            let mut y_high = V::less(high, radius);
+            let y_high = V::less(high, radius);
+            let mut at = Sides::<V> { x_low, x_high, y_low, y_high };
+            let slopes = Slopes::<V>::new(x_next, x_before, y_next, y_before);
             for _ in 0..4 {
-                let near = |low, high| V::greater(V::subtract(nearest::<V>(low, high), half), zero);
-                let far = |low, high| V::add(farthest::<V>(low, high), half);
-                let least = squares::<V>(near(x_low, x_high), near(y_low, y_high));
-                let most = squares::<V>(far(x_low, x_high), far(y_low, y_high));
-                let z_high = V::square_root(V::greater(V::subtract(square_more, least), zero));
-                let middle = V::square_root(V::greater(V::subtract(square_less, most), zero));
-                let z_low = V::choose(V::at_least(rim, middle), zero, V::subtract(middle, sag));
-                // A neighbour outside the cutter bounds nothing.
-                let chord = |low, high| {
-                    let far = farthest::<V>(low, high);
-                    V::square_root(V::greater(V::subtract(square_less, V::multiply(far, far)), zero))
-                };
-                let x_cap = V::subtract(chord(y_low, y_high), start);
-                let y_cap = V::subtract(chord(x_low, x_high), start);
-                let bound = V::subtract(self::low::<V>(x_next, z_low, z_high), half);
-                x_low = V::greater(x_low, V::less(bound, x_cap));
-                let bound = V::add(self::high::<V>(x_before, z_low, z_high), half);
-                x_high = V::less(x_high, V::greater(bound, V::subtract(zero, x_cap)));
-                let bound = V::subtract(self::low::<V>(y_next, z_low, z_high), half);
-                y_low = V::greater(y_low, V::less(bound, y_cap));
-                let bound = V::add(self::high::<V>(y_before, z_low, z_high), half);
-                y_high = V::less(y_high, V::greater(bound, V::subtract(zero, y_cap)));
+                slopes.sweep(&mut at, &sweeper);
             }
+            let Sides { mut x_low, mut x_high, mut y_low, mut y_high } = at;
             if whole {
                 (x_low, x_high) = (V::ceil(x_low), V::floor(x_high));
                 (y_low, y_high) = (V::ceil(y_low), V::floor(y_high));

@@ -15,7 +15,6 @@
 use super::Profile;
 use super::ball::{Ball, Reachable};
 use super::blocks::{Block, Boxes, Moderate, ROWS, measure};
-use super::brute;
 use super::field::{Field, PAD, Targets};
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors, widest};
@@ -24,11 +23,14 @@ use super::runs::{Run, raise_run, row_work};
 use super::slopes::Rises;
 use super::unboxed;
 
-/// What bounding a block costs, in groups of lanes.
+/// What raising targets by blocks of one box costs besides, in groups of lanes.
 const BLOCK_WORK: usize = 60;
 
+/// What bounding the samples of a block costs, and once more if some are steep.
+const SPLIT_WORK: usize = 600;
+
 /// What looking at far neighbours costs.
-const FAR_WORK: usize = 400;
+const FAR_WORK: usize = 900;
 
 /// Groups of lanes from which a sample's box is worth tightening by far neighbours.
 pub(super) const WIDE: f64 = 100.0;
@@ -44,8 +46,8 @@ const TALL: f64 = 3.0;
 
 widest! {
     /// Raises the targets by every sample of the field that can touch a cutter there, or sets
-    /// `given_up` because taking every sample is less work on such a surface.
-    fn contacts<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: &mut Targets, given_up: &mut bool) = body
+    /// `given_up` because it is more work than `every_tap`, in groups of lanes.
+    fn contacts<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: &mut Targets, every_tap: f64, given_up: &mut bool) = body
 }
 
 #[inline(always)]
@@ -54,10 +56,10 @@ pub(super) fn body<V: Vectors, P: Pairs>(
     pairs: &P,
     profile: &Profile,
     out: &mut Targets,
+    every_tap: f64,
     given_up: &mut bool,
 ) {
     let ball = Ball { radius: profile.radius(), step_mm: profile.step_mm(), slack_mm: pairs.slack_mm() };
-    let every_tap = brute::work(profile, out);
     if !pairs.is_lattice() {
         *given_up = !unboxed::contacts::<V, P>(field, pairs, &ball, every_tap, out);
         return;
@@ -75,7 +77,7 @@ pub(super) fn body<V: Vectors, P: Pairs>(
     };
     for a in (0..field.rows).step_by(ROWS) {
         let part = a as f64 / field.rows as f64;
-        if part > 0.1 && search.work as f64 > part * every_tap {
+        if part > 0.015 && search.work as f64 > part * every_tap {
             *given_up = true;
             return;
         }
@@ -192,13 +194,13 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
     /// A block whose samples have boxes of their own.
     #[inline(always)]
     fn split(&mut self, block: Block, out: &mut Targets) {
-        self.work += 2 * BLOCK_WORK;
+        self.work += SPLIT_WORK;
         match &self.moderate {
-            Some(moderate) => self.boxes.fill(self.field, block, moderate, self.whole),
+            Some(moderate) => self.boxes.fill(self.field, block, &self.ball, moderate, self.whole),
             None => self.boxes.all_steep(self.field, block),
         }
         if self.boxes.any_steep != 0 {
-            self.work += 2 * BLOCK_WORK;
+            self.work += SPLIT_WORK;
             self.boxes.fill_steep(self.field, block, &self.ball, self.whole);
         }
         let mut small = self.boxes.small(block.rows, if self.whole { 1.0 } else { 1.6 });

@@ -39,7 +39,6 @@ pub(super) trait Vectors {
     /// The greater of each lane; lanes are numbers and never -0.
     fn greater(a: Self::Group, b: Self::Group) -> Self::Group;
     fn less(a: Self::Group, b: Self::Group) -> Self::Group;
-    fn square_root(a: Self::Group) -> Self::Group;
     fn floor(a: Self::Group) -> Self::Group;
     fn ceil(a: Self::Group) -> Self::Group;
     /// Lanes where a >= b, as bits.
@@ -47,7 +46,7 @@ pub(super) trait Vectors {
     /// `a` in the lanes of these bits and `b` in the others.
     fn choose(bits: u16, a: Self::Group, b: Self::Group) -> Self::Group;
 
-    /// 1 / sqrt(a) for a >= 1, relatively within [`Vectors::INVERSE_ERROR`].
+    /// 1 / sqrt(a) for 1e-12 <= a <= 1e31, relatively within [`Vectors::INVERSE_ERROR`].
     fn inverse_root(a: Self::Group) -> Self::Group;
     const INVERSE_ERROR: f32;
 
@@ -112,11 +111,6 @@ impl Vectors for Portable {
     #[inline(always)]
     fn less(a: Self::Group, b: Self::Group) -> Self::Group {
         std::array::from_fn(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
-    }
-
-    #[inline(always)]
-    fn square_root(a: Self::Group) -> Self::Group {
-        a.map(f32::sqrt)
     }
 
     #[inline(always)]
@@ -202,11 +196,6 @@ impl Vectors for Avx2 {
     }
 
     #[inline(always)]
-    fn square_root(a: Self::Group) -> Self::Group {
-        unsafe { [x86::_mm256_sqrt_ps(a[0]), x86::_mm256_sqrt_ps(a[1])] }
-    }
-
-    #[inline(always)]
     fn floor(a: Self::Group) -> Self::Group {
         unsafe { [x86::_mm256_floor_ps(a[0]), x86::_mm256_floor_ps(a[1])] }
     }
@@ -287,11 +276,6 @@ impl Vectors for Avx512 {
     #[inline(always)]
     fn less(a: Self::Group, b: Self::Group) -> Self::Group {
         unsafe { x86::_mm512_min_ps(a, b) }
-    }
-
-    #[inline(always)]
-    fn square_root(a: Self::Group) -> Self::Group {
-        unsafe { x86::_mm512_sqrt_ps(a) }
     }
 
     #[inline(always)]

@@ -24,6 +24,7 @@ mod drop;
 mod field;
 mod interval;
 mod lanes;
+mod memory;
 mod pairs;
 mod passes;
 mod places;
@@ -39,7 +40,9 @@ pub use drop::{Faces, lift};
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows};
 pub use places::Places;
 pub use profile::Profile;
-pub use stream::{Band, stream};
+pub use stream::{Band, stream, stream_bytes};
+#[doc(hidden)]
+pub use tiles::{Way, cutter_location_by};
 pub use tiles::{closing, cutter_location, cutter_location_rows, erode, residual};
 
 /// Why a compensation was refused.
@@ -63,6 +66,10 @@ pub enum Error {
         "every {every} rows of {step_mm} mm leave strips that cutter {cutter} with a radius of {radius_mm} mm does not touch; hint: --every {most} at most"
     )]
     Strips { every: usize, step_mm: f64, cutter: String, radius_mm: f64, most: usize },
+    #[error(
+        "{columns} columns under cutter {cutter} take {needed_gb:.1} GB of memory a band, {there_gb:.1} GB are free; hint: a coarser --step-mm or a part of the file"
+    )]
+    Memory { columns: usize, cutter: String, needed_gb: f64, there_gb: f64 },
     #[error(
         "none of the {samples} samples has data; hint: a finer --step-mm, or is the part seen from its side?"
     )]

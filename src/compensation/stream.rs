@@ -2,7 +2,7 @@ use super::{Profile, RowPass, cutter_location_rows, erode, machined_by_rows, res
 use crate::grid::{Heights, Lattice, Window};
 
 /// Samples of one band, about: what is held at once is a few bands and the cutter's reach.
-const BAND_SAMPLES: usize = 1 << 23;
+const BAND_SAMPLES: usize = 1 << 24;
 
 /// Rows of one band of a whole part, and what a cutter makes of them.
 #[derive(Clone, Debug)]
@@ -33,8 +33,23 @@ pub fn stream<E>(
     lift: impl FnMut(&mut Heights) -> Result<(), E>,
     each: impl FnMut(Band) -> Result<(), E>,
 ) -> Result<(), E> {
-    let rows_at_once = (BAND_SAMPLES / lattice.columns.max(1)).clamp(64, 1024);
-    by_rows(rows_at_once, lattice, profile, every, with_closing, read, lift, each)
+    by_rows(rows_at_once(lattice), lattice, profile, every, with_closing, read, lift, each)
+}
+
+fn rows_at_once(lattice: &Lattice) -> usize {
+    (BAND_SAMPLES / lattice.columns.max(1)).clamp(64, 1024)
+}
+
+/// Bytes that [`stream`] holds at once, about and rather more: by the width of the part and the
+/// cutter, whatever the part's height.
+pub fn stream_bytes(lattice: &Lattice, profile: &Profile, with_closing: bool) -> u64 {
+    let rows = rows_at_once(lattice).min(lattice.rows);
+    let reach = profile.reach();
+    let halo = if with_closing { reach } else { 0 };
+    let width = lattice.columns + 2 * (halo + reach);
+    // The part with its halo, the rows cut (twice while they grow), and four bands of results.
+    let rows = rows + 2 * (halo + reach) + 2 * (rows + 2 * halo) + 4 * rows;
+    4 * width as u64 * rows as u64
 }
 
 #[allow(clippy::too_many_arguments)]
