@@ -147,6 +147,11 @@ fn a_screen_within_its_limits_says_what_would_break_first() {
         .success()
         .stdout(predicate::str::contains("no point of the"));
     assert!(first == fs::read(Path::new(out).join("design-space.png")).expect("a picture"));
+    // A flat screen has no second picture, and none of an earlier run stays.
+    assert!(Path::new(out).join("design-space-elevated.png").exists());
+    let flat = coarse(folder.path(), "\"poisson\"", "\"flat\"");
+    screenmill(&["limits", &flat, "--out", out]).success();
+    assert!(!Path::new(out).join("design-space-elevated.png").exists());
 }
 
 #[test]

@@ -14,6 +14,19 @@ use super::{Common, Outcome, Refusal};
 /// Smallest gap that 20/20 vision sees, in minutes of arc.
 const ACUITY_ARCMIN: f64 = 1.0;
 
+/// All that a run may write; what an earlier one left of it goes.
+const OUTPUTS: [&str; 9] = [
+    "limits.json",
+    "design-space.svg",
+    "design-space.png",
+    "design-space-elevated.svg",
+    "design-space-elevated.png",
+    "margin.svg",
+    "margin.png",
+    "margin-elevated.svg",
+    "margin-elevated.png",
+];
+
 /// How far a screen is from shadowing itself: Eqs. 10 and 11 at every cell
 #[derive(clap::Args, Debug)]
 pub struct Arguments {
@@ -76,8 +89,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     });
     if let Some(staging) = staging {
         write_json(&staging.path().join("limits.json"), &report)?;
-        let names: Vec<&str> = files.iter().map(String::as_str).collect();
-        staging.publish(&names)?;
+        staging.publish(&OUTPUTS)?;
     }
     console.times();
     if common.json {
