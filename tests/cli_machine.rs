@@ -78,6 +78,12 @@ fn a_machine_is_calibrated_by_three_times() {
     let estimated = json(&format!("estimate {out}/2-corners.rml --machine roland-egx-600 --json"));
     let off = estimated["time_s"].as_f64().expect("seconds") / seconds[1] - 1.0;
     assert!(off.abs() < 1e-9, "{off}");
+    // Also where a unit of RML-1 is not 0.01 mm.
+    let coarse = json(&format!("calibrate-machine --machine roland-mdx-20 --out {out}/mdx-20 --json"));
+    let estimated = json(&format!("estimate {out}/mdx-20/3-blocks.rml --machine roland-mdx-20 --json"));
+    let wanted = coarse["programs"][2]["expected_s"].as_f64().expect("seconds");
+    let off = estimated["time_s"].as_f64().expect("seconds") / wanted - 1.0;
+    assert!(off.abs() < 1e-9, "{off}");
     // A slower machine: a profile of its own, which estimate takes.
     let [a, b, c] = [1.1 * seconds[0], 1.2 * seconds[1], 2.0 * seconds[2]];
     let times = format!("--times {a} {b} {c}");

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use screenmill::job::Job;
 use screenmill::machine::Machine;
 use screenmill::pipeline;
-use screenmill::verify::{Clock, Event, Extent, Kinematics, Language, Summary, Timing};
+use screenmill::post::Dialect;
+use screenmill::verify::{Clock, Event, Extent, Kinematics, Language, Options, Summary, Timing};
 use serde_json::{Map, Value, json};
 
 use super::console::Console;
@@ -59,11 +60,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let name = arguments.machine.as_deref().ok_or(Misused::NoMachine)?;
     let machine = Machine::find(name, None)?;
     let kinematics = Kinematics::from(&machine);
+    let options = options(&machine)?;
     let mut total_s = 0.0;
     let mut limits: Vec<(&'static str, f64)> = Vec::new();
     let mut programs = Vec::new();
     for path in &arguments.programs {
-        let one = estimate(path, &kinematics)?;
+        let one = estimate(path, &options, &kinematics)?;
         total_s += one.timing.total_s;
         for (name, seconds) in one.timing.limits() {
             match limits.iter_mut().find(|l| l.0 == name) {
@@ -142,11 +144,11 @@ fn job(path: &Path, common: &Common) -> Result<Outcome, Refusal> {
     Ok(if over { Outcome::Found } else { Outcome::Within })
 }
 
-fn estimate(path: &Path, kinematics: &Kinematics) -> Result<Estimated, Refused> {
-    let travel = travel_mm_min(path)?;
+fn estimate(path: &Path, options: &Options, kinematics: &Kinematics) -> Result<Estimated, Refused> {
+    let travel = travel_mm_min(path, options)?;
     let mut timer = Clock::new(kinematics, travel);
     let mut extent = Extent::with_travel(travel);
-    let summary = stream(path, &mut |event| {
+    let summary = stream(path, options, &mut |event| {
         timer.event(event);
         if let Event::Move(motion) = event {
             extent.add(motion);
@@ -156,13 +158,24 @@ fn estimate(path: &Path, kinematics: &Kinematics) -> Result<Estimated, Refused> 
     Ok(Estimated { summary, extent, timing })
 }
 
+/// The unit of RML-1 on this machine, which the text does not say.
+fn options(machine: &Machine) -> Result<Options, Refusal> {
+    for name in &machine.dialects {
+        let dialect = Dialect::find(name, None)?;
+        if dialect.extension == "rml" {
+            return Ok(Options { rml_unit_mm: dialect.unit_mm });
+        }
+    }
+    Ok(Options::default())
+}
+
 /// RML-1 has no rapids, so its travel speed has to be found before the text is timed.
-fn travel_mm_min(path: &Path) -> Result<Option<f32>, Refused> {
+fn travel_mm_min(path: &Path, options: &Options) -> Result<Option<f32>, Refused> {
     if language(path)? != Language::Rml1 {
         return Ok(None);
     }
     let mut travel = screenmill::verify::Travel::default();
-    stream(path, &mut |event| {
+    stream(path, options, &mut |event| {
         if let Event::Move(motion) = event {
             travel.add(motion);
         }

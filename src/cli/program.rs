@@ -42,15 +42,15 @@ pub fn read(path: &Path) -> Result<Reading, Refused> {
 
 /// Reads a program event by event; a text without a motion is refused. The text is taken apart on a
 /// thread of its own.
-pub fn stream(path: &Path, each: &mut dyn FnMut(&Event)) -> Result<Summary, Refused> {
+pub fn stream(path: &Path, options: &Options, each: &mut dyn FnMut(&Event)) -> Result<Summary, Refused> {
     let refused = |source| Refused::Text { path: path.into(), source };
-    let mut file = open(path)?;
+    let (mut file, options) = (open(path)?, *options);
     let (sender, batches) = mpsc::sync_channel::<Vec<Event>>(BATCHES);
     let mut moved = false;
     let summary = std::thread::scope(|scope| {
         let reader = scope.spawn(move || {
             let mut batch = Vec::with_capacity(BATCH);
-            let summary = verify::read(&mut file, &Options::default(), &mut |event| {
+            let summary = verify::read(&mut file, &options, &mut |event| {
                 batch.push(*event);
                 if batch.len() == BATCH {
                     // The other end takes everything until this one is done.
