@@ -236,3 +236,37 @@ fn a_wall_is_not_cut_and_an_open_edge_is() {
     let report = bench.mill(0);
     assert!(figure(&report, "cavity_area_fraction") > 0.05, "the wall keeps the ball off the edge: {report}");
 }
+
+/// A pit 7 mm deep with upright walls, cut with a ball whose neck is 4 mm long.
+#[test]
+fn a_shank_that_rubs_is_found_and_its_programs_are_set_aside() {
+    let bench = Bench::with(&[
+        ("screen = \"screen.toml\"\ncells = [324, 149, 325, 150]", "heights = \"pit.npy\"\npixel_mm = 0.1"),
+        ("step_mm = 0.02", "step_mm = 0.1"),
+        ("thickness_mm = 10", "thickness_mm = 15"),
+        ("gouge_mm = 0.002", "gouge_mm = 0.05"),
+        ("stepdown_mm = 0.3", "stepdown_mm = 1.0"),
+        ("stepover_mm = 0.1", "stepover_mm = 0.4"),
+    ]);
+    let side = 120;
+    let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({side}, {side}), }}");
+    npy.extend(format!("{header:<117}\n").bytes());
+    let inside = |at: usize| (30..90).contains(&at);
+    for row in 0..side {
+        for column in 0..side {
+            let z: f32 = if inside(row) && inside(column) { -7.0 } else { 0.0 };
+            npy.extend(z.to_le_bytes());
+        }
+    }
+    bench.write("pit.npy", npy);
+    let report = bench.mill(1);
+    let findings = report["findings"].as_array().expect("findings");
+    let hit = findings.iter().find(|finding| finding["code"] == "holder").expect("the shank is found");
+    let message = hit["message"].as_str().expect("a message");
+    assert!(
+        message.contains("02-finish-ball-1") && message.contains("the shank of ball-1 is 3."),
+        "{message}"
+    );
+    assert!(programs(&report).iter().all(|file| file.starts_with("rejected/")));
+}
