@@ -41,6 +41,7 @@ pub mod toolpath;
 
 pub mod post;
 
+pub mod resume;
 pub mod verify;
 
 pub mod fidelity;

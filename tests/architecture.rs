@@ -19,6 +19,7 @@ const ORDER: [&str; 20] = [
     "toolpath",
     "post",
     "verify",
+    "resume",
     "fidelity",
     "evaluation",
     "report",

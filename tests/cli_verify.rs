@@ -204,3 +204,25 @@ fn an_estimate_says_what_limits() {
             predicate::str::contains("cutting").and(predicate::str::contains("verify against your machine")),
         );
 }
+
+#[test]
+fn a_stopped_program_is_resumed_at_a_pass() {
+    let dir = tempfile::tempdir().expect("a folder");
+    std::fs::write(dir.path().join("p.ngc"), program(0.0)).expect("a program");
+    let resume = |arguments: &str| {
+        screenmill().current_dir(dir.path()).args(["resume", "p.ngc"]).args(arguments.split(' ')).assert()
+    };
+    resume("--at 7 --out q.ngc")
+        .success()
+        .stdout(predicate::str::contains("q.ngc: from pass 7 of 1 to 105 (line 32), at X -1 Y -0.3 Z 2"));
+    let text = std::fs::read_to_string(dir.path().join("q.ngc")).expect("written");
+    assert!(text.starts_with("G21 G90 G17 G64 P0.001\nM3 S20000\nG4 P2\nG0 Z2\nG0 X-1 Y-0.6\n"), "{text}");
+    assert!(text.contains("G0 X-1 Y-0.3 Z2\nF320\nG1 Z"), "{text}");
+    resume("--at 7").success().stdout(text);
+    resume("--at 500").code(2).stderr(
+        "error: p.ngc: pass 500 is asked for, the program has passes 1 to 105; hint: --at 1 .. 105\n",
+    );
+    resume("--at 7 --out p.ngc")
+        .code(2)
+        .stderr("error: p.ngc is the program itself; hint: --out names another file\n");
+}

@@ -67,6 +67,7 @@ fn program(change: &str) -> String {
         "feed-zero" => tool.feed_mm_min = 0.0,
         "rpm" => tool.spindle_rpm = 40_000.0,
         "rpm-nan" => tool.spindle_rpm = f64::NAN,
+        "memory" => machine.transfer.memory_bytes = Some(100),
         "dwell" => machine.spindle.spin_up_s = 40.0,
         "line" => dialect.limits.line_max = 8,
         "disk" => out = Box::new(Full),

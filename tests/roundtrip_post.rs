@@ -3,7 +3,9 @@
 use proptest::prelude::*;
 use screenmill::machine::{Library, Machine, Tool};
 use screenmill::post::{self, Dialect, Point, Program, StockFacts, ZZero};
+use screenmill::resume;
 use screenmill::toolpath::{GridPoint, Kind, Move, Toolpath};
+use screenmill::verify::{Options, Reading};
 
 /// Dialect, machine, and how it spells 320 and 80 mm/min, then 30 and 15 mm/s where rapids need them.
 const DIALECTS: [(&str, &str, [&str; 4]); 10] = [
@@ -20,6 +22,17 @@ const DIALECTS: [(&str, &str, [&str; 4]); 10] = [
 ];
 
 fn text_of(path: &Toolpath, tool: &Tool, dialect: &Dialect, machine: &Machine) -> Vec<u8> {
+    texts_of(path, tool, dialect, machine, false).swap_remove(0)
+}
+
+/// The program of a path, or its sections.
+fn texts_of(
+    path: &Toolpath,
+    tool: &Tool,
+    dialect: &Dialect,
+    machine: &Machine,
+    in_sections: bool,
+) -> Vec<Vec<u8>> {
     let stock = StockFacts {
         material: "aluminium".into(),
         width_mm: 10.0,
@@ -41,9 +54,16 @@ fn text_of(path: &Toolpath, tool: &Tool, dialect: &Dialect, machine: &Machine) -
         clearance_mm: 5.0,
         notes: &[],
     };
-    let mut text = Vec::new();
-    post::write(&program, dialect, machine, &mut text).expect("written");
-    text
+    let whole = vec![(None, std::borrow::Cow::Borrowed(path))];
+    let pieces =
+        if in_sections { post::sections(&program, dialect, machine).expect("sections") } else { whole };
+    let texts = pieces.iter().map(|(section, path)| {
+        let mut text = Vec::new();
+        let program = Program { path, section: *section, ..program.clone() };
+        post::write(&program, dialect, machine, &mut text).expect("written");
+        text
+    });
+    texts.collect()
 }
 
 /// A motion as read: where to, and the feed in mm/min (None: rapid).
@@ -263,4 +283,108 @@ fn linuxcnc_reads_it_as_meant() {
     assert_eq!(cut, want);
     let edge = |axis: usize, pick: fn(i32, i32) -> i32| want.iter().map(|to| to[axis]).reduce(pick);
     assert_eq!(Some(*park), edge(0, i32::min).zip(edge(1, i32::max)).map(|(x, y)| [x, y, 50_000]));
+}
+
+/// Twenty passes of 5 mm, each from the clearance plane and back to it.
+fn twenty_passes(unit_mm: f64) -> Toolpath {
+    let mm = |mm: f64| (mm / unit_mm).round() as i32;
+    let (mut moves, mut pass_starts) = (Vec::new(), Vec::new());
+    for pass in 0..20 {
+        let y = mm(0.25 * f64::from(pass));
+        pass_starts.push(moves.len());
+        moves.push(Move { kind: Kind::Rapid, to: [0, y, mm(5.0)] });
+        moves.push(Move { kind: Kind::Rapid, to: [0, y, mm(0.5)] });
+        moves.push(Move { kind: Kind::Plunge, to: [0, y, -mm(0.1 + 0.025 * f64::from(pass))] });
+        moves.push(Move { kind: Kind::Cut, to: [mm(2.0), y, -mm(0.2)] });
+        moves.push(Move { kind: Kind::Cut, to: [mm(5.0), y, -mm(0.1)] });
+        moves.push(Move { kind: Kind::Rapid, to: [mm(5.0), y, mm(5.0)] });
+    }
+    Toolpath { unit_mm, moves, pass_starts, ..Toolpath::default() }
+}
+
+fn reading(text: &[u8], dialect: &Dialect) -> Reading {
+    let options = Options { rml_unit_mm: dialect.unit_mm };
+    Reading::of(text, &options).unwrap_or_else(|e| panic!("{}: {e}", dialect.name))
+}
+
+/// Ends of the motions that lie below the clearance plane.
+fn below(reading: &Reading) -> Vec<[f64; 3]> {
+    reading.motions.iter().map(|motion| motion.to_mm).filter(|to| to[2] < 5.0 - 1e-9).collect()
+}
+
+#[test]
+fn sections_cut_what_the_whole_cuts_and_each_within_its_limits() {
+    let library = Library::find("tools", None).expect("embedded");
+    let mut tool = library.tool("ball-1").expect("in it").clone();
+    for (name, machine, _) in DIALECTS {
+        let dialect = Dialect::find(name, None).expect("embedded");
+        let mut machine = Machine::find(machine, None).expect("embedded");
+        let path = twenty_passes(dialect.unit_mm);
+        let whole = reading(&text_of(&path, &tool, &dialect, &machine), &dialect);
+        tool.tool_life_m = Some(0.05);
+        let worn = texts_of(&path, &tool, &dialect, &machine, true);
+        tool.tool_life_m = Some(1e6);
+        let most = if dialect.comment.is_some() { 2400 } else { 700 };
+        machine.transfer.memory_bytes = Some(most);
+        let stored = texts_of(&path, &tool, &dialect, &machine, true);
+        machine.transfer.memory_bytes = None;
+        assert_eq!(
+            texts_of(&path, &tool, &dialect, &machine, true).len(),
+            1,
+            "{name}: nothing asks for sections"
+        );
+        // 5.6 to 6.1 mm of plunge and cut a pass: eight of them are less than 50 mm.
+        assert_eq!(worn.len(), 3, "{name}");
+        assert!(stored.iter().all(|text| text.len() as u64 <= most), "{name}");
+        for texts in [&worn, &stored] {
+            let readings: Vec<Reading> = texts.iter().map(|text| reading(text, &dialect)).collect();
+            let cut: Vec<[f64; 3]> = readings.iter().flat_map(below).collect();
+            assert_eq!(cut, below(&whole), "{name}");
+            for reading in &readings {
+                let last = reading.motions.iter().rev().find(|m| m.known()).expect("motions");
+                assert_eq!(last.to_mm[2], 5.0, "{name}: ends on the clearance plane");
+            }
+        }
+        if dialect.comment.is_some() {
+            let text = String::from_utf8(worn[1].clone()).expect("ASCII").to_lowercase();
+            assert!(text.contains("2 of 3, fit a fresh cutter and set z0 again"), "{name}: {text}");
+            assert!(text.contains("section 2 of 3 ends here"), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_program_is_resumed_at_every_pass_in_every_dialect() {
+    let library = Library::find("tools", None).expect("embedded");
+    let tool = library.tool("ball-1").expect("in it");
+    for (name, machine, _) in DIALECTS {
+        let dialect = Dialect::find(name, None).expect("embedded");
+        let machine = Machine::find(machine, None).expect("embedded");
+        let options = Options { rml_unit_mm: dialect.unit_mm };
+        let path = twenty_passes(dialect.unit_mm);
+        let text = text_of(&path, tool, &dialect, &machine);
+        let whole = reading(&text, &dialect);
+        for at in [1, 2, 7, 20] {
+            let resumed = resume::resume(&text, at, &options).unwrap_or_else(|e| panic!("{name} {at}: {e}"));
+            assert_eq!((resumed.first, resumed.last), (1, 20), "{name}");
+            let again = reading(&resumed.text, &dialect);
+            let skipped = 4 * (at as usize - 1);
+            assert_eq!(below(&again), below(&whole)[skipped..], "{name} {at}");
+            // Nothing but the way there comes before, and none of it under the clearance plane.
+            let first = again.motions.iter().position(|m| m.to_mm[2] < 5.0 - 1e-9).expect("a descent");
+            assert!(again.motions[..first].iter().all(|m| !(m.to_mm[2] < 5.0 - 1e-9)), "{name} {at}");
+            let over = again.motions[first - 1].to_mm;
+            assert_eq!(over, [0.0, 0.25 * (at - 1) as f64, 5.0], "{name} {at}");
+            let feed = again.motions[first].feed_mm_min;
+            assert!(feed.is_infinite() || feed >= 900.0, "{name} {at}: comes down at {feed}");
+            assert_eq!(again.dwells.len(), whole.dwells.len(), "{name} {at}: waits for the spindle");
+            for line in resumed.text.split(|b| *b == b'\n') {
+                assert!(line.len() <= dialect.limits.line_max + 1, "{name} {at}");
+            }
+            // And again from there: marks keep their numbers, RML-1 is counted from 1.
+            let next = if dialect.comment.is_some() { at } else { 1 };
+            let twice = resume::resume(&resumed.text, next, &options).expect("again");
+            assert_eq!(twice.text, resumed.text, "{name} {at}");
+        }
+    }
 }

@@ -1,5 +1,7 @@
 //! What texts mean: the same path said in other ways reads as the same motions.
 
+use proptest::prelude::*;
+use screenmill::resume;
 use screenmill::verify::{Language, Motion, Note, Options, Reading, language};
 
 fn read(text: &str) -> Reading {
@@ -213,4 +215,97 @@ fn a_replay_gives_the_events_again() {
             .collect()
     };
     assert_eq!(plain(&direct), plain(&again));
+}
+
+/// Bytes that make up programs, so that random ones get past the first character.
+fn scraps() -> impl Strategy<Value = Vec<u8>> {
+    let words: Vec<&'static str> = vec![
+        "G0",
+        "G1",
+        "G2",
+        "G3",
+        "G20",
+        "G21",
+        "G90",
+        "G91",
+        "G17",
+        "G18",
+        "G28",
+        "G43 H1",
+        "G53",
+        "G64 P0.001",
+        "G4 P1",
+        "G187 P3 E0.01",
+        "X1",
+        "Y-2.5",
+        "Z5",
+        "Z-1",
+        "I1",
+        "J0.5",
+        "R2",
+        "F300",
+        "S9000",
+        "M3",
+        "M5",
+        "M2",
+        "M30",
+        "T1 M6",
+        "N10",
+        "O1",
+        "%",
+        "(pass 1)",
+        "(pass 2)",
+        "; pass 3",
+        "\n",
+        "\r\n",
+        " ",
+        "^DF",
+        "^PA",
+        "^PR",
+        "PU",
+        "PD1,2;",
+        "Z0,0,500",
+        "Z100,50,-20",
+        "!ZM500",
+        "!MC1",
+        "!RC8",
+        "V15.0",
+        "W3000",
+        "W0",
+        "H",
+        ";",
+        ",",
+        "-",
+        ".",
+        "1e9",
+        "9999999999",
+        "#1",
+        "[",
+        "/",
+        "\u{e9}",
+        "\0",
+    ];
+    let piece = prop_oneof![
+        8 => prop::sample::select(words).prop_map(|word| word.as_bytes().to_vec()),
+        1 => prop::collection::vec(any::<u8>(), 0..4),
+    ];
+    prop::collection::vec(piece, 0..60).prop_map(|pieces| pieces.concat())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A reading or a refusal, never a panic, for both languages and for what is resumed of them.
+    #[test]
+    fn any_bytes_are_read_or_refused(text in scraps(), rml in any::<bool>(), at in 0u64..4) {
+        let text = if rml { [b"^DF\n^PA\nV15.0\nZ0,0,500\n".as_slice(), &text].concat() } else { text };
+        let options = Options::default();
+        if let Err(refusal) = Reading::of(&text, &options) {
+            let message = refusal.to_string();
+            prop_assert!(!message.is_empty() && message.lines().count() <= 12);
+        }
+        if let Ok(resumed) = resume::resume(&text, at, &options) {
+            prop_assert!(Reading::of(&resumed.text, &options).is_ok());
+        }
+    }
 }

@@ -18,6 +18,7 @@ mod part;
 mod posts;
 mod program;
 mod raster;
+mod resume;
 mod simulate;
 mod staging;
 mod tools;
@@ -66,6 +67,7 @@ enum Command {
     Raster(raster::Arguments),
     Compensate(compensate::Arguments),
     Simulate(simulate::Arguments),
+    Resume(resume::Arguments),
     Light(light::Arguments),
     CalibrateMachine(calibrate_machine::Arguments),
     Machines(machines::Arguments),
@@ -112,6 +114,7 @@ pub fn run() -> ExitCode {
         Command::Raster(arguments) => raster::run(arguments, common),
         Command::Compensate(arguments) => compensate::run(arguments, common),
         Command::Simulate(arguments) => simulate::run(arguments, common),
+        Command::Resume(arguments) => resume::run(arguments, common),
         Command::Light(arguments) => light::run(arguments, common),
         Command::CalibrateMachine(arguments) => calibrate_machine::run(arguments, common),
         Command::Machines(arguments) => machines::run(arguments, common),

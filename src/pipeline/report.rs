@@ -253,12 +253,18 @@ fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Finding> {
     if let Some(life_m) = tool.tool_life_m
         && length_m > life_m
     {
-        let cutters = (length_m / life_m).ceil();
         let message = format!(
-            "{file}: {length_m:.0} m of cut, {} lasts {life_m} m; hint: {cutters} cutters, changed at a pass end",
+            "{file}: {length_m:.0} m of cut without a retract, {} lasts {life_m} m; hint: pattern = \"one-way\" can be cut in sections at every pass",
             tool.name
         );
         found.push(finding(Severity::Warning, "tool-life", message));
+    }
+    if let Some(section) = program.section.filter(|section| section.index == 1) {
+        let message = format!(
+            "{file}: the first of {} sections; the setup sheet says where a fresh {} begins",
+            section.count, tool.name
+        );
+        found.push(finding(Severity::Note, "sections", message));
     }
     for note in &program.reading.summary.notes {
         found.push(finding(Severity::Note, "program", format!("{file}: {note}")));

@@ -113,10 +113,12 @@ impl Modal {
         }
         self.modes(block, each)?;
         let once = block.code(Group::Once);
+        let mut waits_by_x = false;
         if let Some((40, at)) = once {
             let (mut seconds, mut letter) = (block.take(b'P'), b'P');
             if seconds.is_none() {
                 (seconds, letter) = (block.take(b'X'), b'X');
+                waits_by_x = true;
             }
             let seconds = seconds.ok_or(Error::NumberMissing { at, letter: 'P' })?;
             self.bounded(block, letter, "the dwell in seconds", seconds, 0.0, 1e6)?;
@@ -142,6 +144,8 @@ impl Modal {
                 }
                 self.leave(block, line, each)?;
             }
+            // G4 X3. waits three seconds and moves nothing.
+            _ if waits_by_x => {}
             _ if block.has(b'X') || block.has(b'Y') || block.has(b'Z') => {
                 self.travel(block, line, notes, each)?;
             }
