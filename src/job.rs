@@ -21,6 +21,7 @@ pub struct Job {
     pub limits: Limits,
     #[serde(default)]
     pub maps: Maps,
+    pub polish: Option<Polish>,
     #[serde(default, rename = "operation")]
     pub operations: Vec<Operation>,
     /// What programs and pages call the part: the job's folder and file name.
@@ -175,6 +176,14 @@ fn five() -> f64 {
 pub struct Tools {
     /// The one that comes with the program if left out.
     pub library: Option<PathBuf>,
+}
+
+/// A model of polishing by hand, whose light is reported beside that of the cut.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Polish {
+    /// Most that is taken off.
+    pub removal_um: f64,
 }
 
 /// What must hold for exit code 0; what is not named is not judged, but for `gouge_mm`.
@@ -359,6 +368,7 @@ impl Job {
             ("limits.normal_p95_deg", limits.normal_p95_deg, 1e-3, 90.0),
             ("limits.on_audience_min", limits.on_audience_min, 0.0, 1.0),
             ("limits.hours_max", limits.hours_max, 1e-6, 1e6),
+            ("polish.removal_um", self.polish.map(|polish| polish.removal_um), 0.01, 1000.0),
         ];
         for (key, value, low, high) in ranges {
             if let Some(value) = value {

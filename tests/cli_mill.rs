@@ -31,6 +31,7 @@ fn a_job_leaves_its_files_and_nothing_else() {
         .chain(
             ["cavities.csv", "cavities.geojson", "report.html", "report.json", "run.json"].map(String::from),
         )
+        .chain(["maps/r0c0-normals.png", "maps/r0c0-light.png", "maps/light-room.png"].map(String::from))
         .chain(["setup-sheet.html", "programs/r0c0-01-rough-flat-3.ngc"].map(String::from))
         .chain(["programs/r0c0-02-finish-ball-1.ngc".to_string()])
         .collect();

@@ -15,9 +15,16 @@ fn passes(shape: &Shape, tilt: f64, vertices: &[f64], planted: Option<(usize, us
     let corner = match *shape {
         Shape::Ball { diameter_mm } => 0.5 * diameter_mm,
         Shape::Bull { corner_radius_mm, .. } => corner_radius_mm,
+        Shape::Taper { tip_diameter_mm, .. } => 0.5 * tip_diameter_mm,
         _ => 0.0,
     };
-    let lift = (shape.radius_mm() - corner) * tilt.abs() + corner * ((1.0 + tilt * tilt).sqrt() - 1.0);
+    // The cones are steeper than the plane, so a vee stands on its tip and a taper on its ball.
+    let flat = match *shape {
+        Shape::Vee { tip_diameter_mm, .. } => 0.5 * tip_diameter_mm,
+        Shape::Taper { .. } => 0.0,
+        _ => shape.radius_mm() - corner,
+    };
+    let lift = flat * tilt.abs() + corner * ((1.0 + tilt * tilt).sqrt() - 1.0);
     let mut text = String::from("G21 G90 M3\nG0 Z2\nG0 X-0.5 Y0.1\nF300\n");
     for pass in 0..8 {
         let y = 0.1 + 0.1 * f64::from(pass);
@@ -50,8 +57,15 @@ fn gouge_mm(text: &str, shape: Shape, tilt: f64) -> f64 {
 }
 
 fn shapes() -> impl Strategy<Value = Shape> {
-    prop::sample::select(vec!["ball:0.4", "ball:1", "flat:0.3", "bull:0.5:0.1"])
-        .prop_map(|text| text.parse().expect("a cutter"))
+    prop::sample::select(vec![
+        "ball:0.4",
+        "ball:1",
+        "flat:0.3",
+        "bull:0.5:0.1",
+        "vee:60:0.2:0.8",
+        "taper:0.3:10:0.6",
+    ])
+    .prop_map(|text| text.parse().expect("a cutter"))
 }
 
 proptest! {
@@ -72,8 +86,8 @@ proptest! {
             vertices.push((x * 1e4f64).round() / 1e4);
         }
         let depth_mm = 1e-3 * depth_um;
-        // A flat's rim is sharp: on a slope its gouge may fall between samples.
-        let tilt = if matches!(shape, Shape::Flat { .. }) { 0.0 } else { tilt };
+        // The rim of a flat, and of a vee's tip, is sharp: on a slope its gouge may fall between samples.
+        let tilt = if matches!(shape, Shape::Flat { .. } | Shape::Vee { .. }) { 0.0 } else { tilt };
         let vertex = vertices.partition_point(|x| *x < 0.5);
         prop_assume!(vertex < vertices.len() && vertices[vertex] < 0.85);
         let sound = gouge_mm(&passes(&shape, tilt, &vertices, None), shape, tilt);

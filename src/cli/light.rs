@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use screenmill::pipeline::{self, Lit, Relit};
-use screenmill::report::light_picture::{self, Hemisphere};
+use screenmill::report::light_picture;
 use screenmill::report::picture::{Caption, write_png};
 use screenmill::report::{self, Light, write_json};
 use serde_json::{Value, json};
@@ -29,9 +29,19 @@ pub struct Arguments {
     /// Take light to arrive at, and leave from, each cell's centre: directions alone count
     #[arg(long)]
     far_field: bool,
+    /// Also light the surface as polishing could leave it, which takes off up to so many um: a model
+    #[arg(long, value_name = "UM", value_parser = removal)]
+    polish_um: Option<f64>,
     /// Pitch of a height file that carries none
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pixel_mm: Option<f64>,
+}
+
+fn removal(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(um) if (0.01..=1000.0).contains(&um) => Ok(um),
+        _ => Err("a removal lies in 0.01 .. 1000 um".into()),
+    }
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
@@ -42,6 +52,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         pixel_mm: arguments.pixel_mm,
         scene: arguments.screen.clone(),
         far_field: arguments.far_field,
+        polish_um: arguments.polish_um,
     };
     let lit = pipeline::relit(&case, &console)?;
     console.times();
@@ -102,27 +113,14 @@ fn draw(lit: &Lit, arguments: &Arguments, maps: &std::path::Path) -> Result<(), 
     ];
     let caption = Caption { part, notes, ..Caption::default() };
     let [design, cut] = &lit.maps;
-    let pixels = (0..cut.rows).flat_map(|row| (0..cut.columns).map(move |column| (column, row)));
-    let lost: Vec<f32> = pixels
-        .map(|(column, row)| (design.share(column, row) - cut.share(column, row)).max(0.0) as f32)
-        .collect();
+    let lost = light_picture::lost(&design.means(), &cut.means());
     let pitch_mm = lit.lattice.step_mm * cut.factor as f64;
-    let picture = light_picture::loss(cut.columns, cut.rows, pitch_mm, &lost, &caption);
+    let frame = light_picture::Frame { columns: cut.columns, rows: cut.rows, pitch_mm };
+    let picture = light_picture::loss(&frame, &lost, &caption);
     write_png(&maps.join("light-lost.png"), &picture)?;
-    let [before, after] = lit.tallies.each_ref().map(|tally| tally.room_gain());
-    let bins = screenmill::fidelity::light::ROOM_BINS;
-    let hemispheres = [
-        Hemisphere { title: "design", gain: &before, bins },
-        Hemisphere { title: "as cut", gain: &after, bins },
-    ];
-    let outlines: Vec<[[f64; 3]; 2]> = lit
-        .scene
-        .audience
-        .iter()
-        .flat_map(|polyhedron| polyhedron.edges())
-        .map(|(ends, _)| ends.map(|end| (end - lit.middle_m).to_array()))
-        .collect();
-    write_png(&maps.join("light-room.png"), &light_picture::room(&hemispheres, &outlines, &caption))?;
+    let [before, after] = &lit.tallies;
+    let room = pipeline::room_picture(&lit.scene, lit.middle_m, before, after, &caption);
+    write_png(&maps.join("light-room.png"), &room)?;
     Ok(())
 }
 
@@ -157,6 +155,14 @@ fn print(lit: &Lit) {
         if let (Some(before), Some(after)) = (before, after) {
             println!("{name:<22} {before:>10.3} {after:>10.3}");
         }
+    }
+    if let Some(polished) = &lit.light.polished {
+        println!(
+            "polished by a model, up to {} um: {:.3} % on the audience, {:.3} % beside it",
+            polished.removal_um,
+            100.0 * polished.on_audience,
+            100.0 * polished.leak
+        );
     }
     if let Some(error) = lit.light.standard_error {
         println!(

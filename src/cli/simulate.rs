@@ -10,7 +10,7 @@ use screenmill::progress::Progress;
 use screenmill::report::{self, Fidelity, Finding, GougeBudget, Severity, finding};
 use screenmill::surface::{self, HeightWriter, Opened, Surface};
 use screenmill::verify::{
-    Blank, Extent, Judged, Kinematics, PathMode, ProgramCut, Reading, Timing, sweep, time,
+    Blank, Extent, Feeds, Judged, Kinematics, PathMode, ProgramCut, Reading, Timing, sweep, time,
 };
 use serde_json::{Value, json};
 
@@ -20,6 +20,8 @@ use super::{Common, Outcome, Refusal};
 
 /// A gouge past this fails.
 const GOUGE_LIMIT_MM: f64 = 0.002;
+/// A gouged part whose half is off by more than this is not what the programs were made for.
+const OFF_MM: f64 = 0.01;
 /// Samples of a band: 32 MiB of floats a layer.
 const BAND_SAMPLES: usize = 1 << 23;
 /// The step of a part that has no samples of its own.
@@ -158,6 +160,7 @@ fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal>
     let cut = cut(surface.as_ref(), &judged, &blank, &arguments.out, console)?;
     let lateral: Vec<_> = judged.iter().map(|j| j.lateral_rapid(&blank)).collect();
     let worked: Vec<_> = judged.iter().map(Judged::worked_mm).collect();
+    let feeds: Vec<_> = judged.iter().map(Judged::feeds).collect();
     let mut findings = Vec::new();
     let mut told = Vec::new();
     for (index, reading) in readings.into_iter().enumerate() {
@@ -182,6 +185,7 @@ fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal>
         }
         if let Some(machine) = &machine {
             program.travel(machine, &mut findings);
+            program.too_fast(machine, &feeds[index], &mut findings);
         }
         told.push(program);
     }
@@ -281,6 +285,21 @@ impl Program {
             );
             findings.push(finding(Severity::Error, "rapid-through-stock", message).at(&hit.at_mm));
         }
+        let last_mm = self.reading.motions.last().map_or(f64::NAN, |motion| motion.to_mm[2] + zero_mm[2]);
+        if last_mm < blank.top_mm - 1e-6 {
+            let message = format!(
+                "{file} ends with the cutter {:.4} mm below the stock's top; hint: is the file complete?",
+                blank.top_mm - last_mm
+            );
+            findings.push(finding(Severity::Warning, "ends-low", message));
+        }
+        if let Some(bite) = self.cut.plunge.filter(|bite| bite.depth_mm > self.cutter.radius_mm()) {
+            let message = format!(
+                "{file} line {}: plunges {:.4} mm straight down into solid, more than the radius of {}; hint: a ramp, or an operation before it",
+                bite.line, bite.depth_mm, self.cutter
+            );
+            findings.push(finding(Severity::Warning, "plunge", message).at(&bite.at_mm));
+        }
         let part = [0, 1].map(|axis| [blank.low_mm[axis], blank.high_mm[axis]]);
         // A program without a feed motion works nowhere.
         let [low, high] = self.worked_mm.unwrap_or([[f64::NAN; 2]; 2]);
@@ -344,6 +363,23 @@ impl Program {
         }
     }
 
+    /// Feeds that the machine does not reach.
+    fn too_fast(&self, machine: &Machine, feeds: &Feeds, findings: &mut Vec<Finding>) {
+        let rate = &machine.rate;
+        for (fastest, most, way) in [
+            (feeds.lateral, rate.feed_xy_max_mm_min, "in X and Y"),
+            (feeds.plunge, rate.feed_z_max_mm_min, "straight down"),
+        ] {
+            if let Some(fastest) = fastest.filter(|fastest| fastest.feed_mm_min > most * (1.0 + 1e-6)) {
+                let message = format!(
+                    "{} line {}: a feed of {} mm/min {way}, {} goes up to {most}",
+                    self.file, fastest.line, fastest.feed_mm_min, machine.name
+                );
+                findings.push(finding(Severity::Warning, "feed", message));
+            }
+        }
+    }
+
     fn path_tolerance_mm(&self) -> f64 {
         self.reading.path_modes.iter().fold(0.0, |most, (_, mode)| match mode {
             PathMode::Blend { tolerance_mm, merge_mm } => {
@@ -375,6 +411,13 @@ impl Judgement {
                 figures.gouge_max_mm, at[0], at[1]
             );
             self.findings.insert(0, finding(Severity::Error, "gouge", message).at(&at));
+            if let Some(half_mm) = figures.deviation_p50_mm.filter(|half_mm| *half_mm > OFF_MM) {
+                let message = format!(
+                    "half of the part is off by more than {half_mm:.4} mm and some of it gouged; hint: another cutter, another --zero or \
+                     another part than the programs were made for?"
+                );
+                self.findings.push(finding(Severity::Warning, "another-job", message));
+            }
         }
         let share = self.uncut as f64 / figures.samples.max(1) as f64;
         if self.stock_top_mm > self.top_mm && share > 0.02 || share > 0.5 {

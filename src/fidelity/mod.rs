@@ -7,11 +7,14 @@ pub mod cavities;
 mod histogram;
 pub mod light;
 mod outline;
+mod pixels;
+pub mod polish;
 mod tally;
 
 pub use cavities::{Cavities, Cavity, Found};
 pub use histogram::Histogram;
 pub use outline::Outline;
+pub use pixels::Pixels;
 pub use tally::{ByCause, CAVITY_THRESHOLD_MM, Figures, Layers, Params, Place, Tally};
 
 use crate::grid::Window;

@@ -3,7 +3,9 @@
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::ops::Range;
 
+use super::Pixels;
 use super::histogram::Histogram;
+use super::pixels::Line;
 use crate::grid::{Heights, Window};
 
 /// |deviation| is counted in nanometres.
@@ -153,6 +155,16 @@ impl Tally {
 
     /// Counts the samples of `block`, whose columns and rows are the part's.
     pub fn add(&mut self, block: Window, layers: Layers) -> Result<(), super::Error> {
+        self.add_with(block, layers, None)
+    }
+
+    /// Counts as [`Tally::add`] does, and adds the normals' errors in degrees to a map of the part or of the block.
+    pub fn add_with(
+        &mut self,
+        block: Window,
+        layers: Layers,
+        mut normals: Option<&mut Pixels>,
+    ) -> Result<(), super::Error> {
         covers("design", layers.design, block)?;
         covers("machined", layers.machined, block)?;
         layers.cavity.map_or(Ok(()), |cavity| covers("cavity", cavity, block))?;
@@ -162,7 +174,11 @@ impl Tally {
         let mut keys = vec![0.0; block.columns];
         for row in block.row..block.row_end() {
             self.add_row(block, row, &layers);
-            self.add_normals(block, row, layers.design, layers.machined, &mut keys);
+            let mut line = normals.as_deref().map(|map| map.line(block));
+            self.add_normals(block, row, &layers, &mut keys, &mut line);
+            if let (Some(map), Some(line)) = (normals.as_deref_mut(), &line) {
+                map.add(row, line);
+            }
         }
         Ok(())
     }
@@ -224,12 +240,12 @@ impl Tally {
         &mut self,
         block: Window,
         row: i64,
-        design: &Heights,
-        machined: &Heights,
+        layers: &Layers,
         keys: &mut [f64],
+        line: &mut Option<Line>,
     ) {
         let (Some(design), Some(machined)) =
-            (Stencil::at(design, block, row), Stencil::at(machined, block, row))
+            (Stencil::at(layers.design, block, row), Stencil::at(layers.machined, block, row))
         else {
             return;
         };
@@ -243,10 +259,17 @@ impl Tally {
             }
         }
         for (i, &key) in keys.iter().enumerate() {
-            if (0.0..KEY_OF_45_DEG).contains(&key) {
-                self.normals.add(key);
-            } else if let Some(key) = careful_key(&design, &machined, i, per_step) {
-                self.normals.add(key);
+            let quick = (0.0..KEY_OF_45_DEG).contains(&key);
+            let Some(key) = (if quick { Some(key) } else { careful_key(&design, &machined, i, per_step) })
+            else {
+                continue;
+            };
+            self.normals.add(key);
+            if let Some(line) = line {
+                // The tangent is the angle to 1 % up to 10 degrees, and costs nothing.
+                let small = key < 0.17 * KEY_OF_45_DEG;
+                let degrees = if small { key * ANGLE_QUANTUM_DEG } else { angle_of_key(key) };
+                line.add(block.column + i as i64, [1.0, degrees]);
             }
         }
     }

@@ -268,7 +268,9 @@ impl Facts<'_> {
         let step_mm = self.job.part.step_mm;
         let limit_mm = self.job.limits.deviation_or_default_mm() as f32;
         let reach = sets.iter().flatten().map(|&i| self.candidates[i].profile.reach()).max().unwrap_or(0);
-        let near = window.grown(1);
+        // Normals need one sample around the block, rays as many as `light` gives them.
+        let halo = if sight.is_some() { light::halo(step_mm) } else { 1 };
+        let near = window.grown(halo);
         let around = surface.heights(near.grown(2 * reach), surface.top_mm())?;
         let design = around.crop(near);
         let mut designed = LightTally::default();
@@ -294,7 +296,7 @@ impl Facts<'_> {
         }
         let mut counts = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
         for row in window.row..window.row_end() {
-            let start = (row - near.row) as usize * near.columns + 1;
+            let start = (row - near.row) as usize * near.columns + halo;
             let line = &reached[start..start + window.columns];
             for (mask, z) in line.iter().zip(&design.z_mm[start..]) {
                 if !z.is_nan() {

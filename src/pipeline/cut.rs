@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::judge::{Case, Verdict, judge};
+use super::judge::{Case, Pictures, Verdict, judge};
 use super::light::Sight;
 use super::maps::Maps;
 use super::part::Part;
@@ -12,11 +12,13 @@ use super::shop::Shop;
 use super::{Error, report};
 use crate::compensation::Profile;
 use crate::cutter::Shape;
+use crate::fidelity::light::LightTally;
 use crate::fidelity::{self, Tally};
 use crate::job::{Blanks, Job};
 use crate::machine::{self, Setup};
 use crate::progress::Progress;
-use crate::report::Report;
+use crate::report::picture::{self, Caption};
+use crate::report::{Report, light_picture};
 use crate::verify::{self, Blank, BodyHit, Judged, LateralRapid};
 
 /// Pieces of a part are not made shorter than this to save travel in Z.
@@ -170,6 +172,8 @@ fn judged(
         tally: fidelity::Params { step_mm, limit_mm: Some(job.limits.deviation_or_default_mm()) },
         cavities: fidelity::cavities::Params::at_step(step_mm),
         sight: sight.as_ref(),
+        polish_mm: job.polish.map(|polish| 1e-3 * polish.removal_um),
+        most_pixels: light_picture::MOST_PIXELS,
     };
     progress.begin("judge", (lattice.columns * lattice.rows) as u64);
     let offset_mm = tile.piece.origin_mm.z;
@@ -181,8 +185,58 @@ fn judged(
     progress.begin("maps", 1);
     let at = &tile.setup.tile;
     let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;
+    draw_means(staging, job, &tile, &verdict, lattice.step_mm)?;
     drop(judged);
     Ok(TileResult { tile, posts, verdict, lateral_rapids, body_hits, maps, map_factor, candidates: names })
+}
+
+/// Pictures of the normals' errors and of lost light.
+fn draw_means(
+    staging: &Path,
+    job: &Job,
+    tile: &TileSetup,
+    verdict: &Verdict,
+    step_mm: f64,
+) -> Result<(), Error> {
+    let at = &tile.setup.tile;
+    let caption = |notes| Caption {
+        part: job.name.clone(),
+        tile: at.name.clone(),
+        origin_mm: [at.x_mm, at.y_mm],
+        notes,
+    };
+    let Pictures { normals, light } = &verdict.pictures;
+    let figures = verdict.tallies[0].figures();
+    let degrees = |value: Option<f64>| value.map_or("-".into(), |deg| format!("{deg:.2}"));
+    let note = format!(
+        "half within {} degrees, 95 % within {}; by central differences every {} um, in the design and in the cut",
+        degrees(figures.normal_p50_deg),
+        degrees(figures.normal_p95_deg),
+        1e3 * step_mm
+    );
+    let shape = light_picture::Frame {
+        columns: normals.columns,
+        rows: normals.rows,
+        pitch_mm: step_mm * normals.factor as f64,
+    };
+    let means: Vec<f32> = normals.means().into_iter().map(|deg| deg as f32).collect();
+    let path = staging.join("maps").join(format!("{}-normals.png", at.name));
+    picture::write_png(&path, &light_picture::normals(&shape, &means, &caption(vec![note])))?;
+    if let (Some([before, after]), Some(designed), Some(machined)) =
+        (light, verdict.light_designed.shares(), verdict.light_machined.first().and_then(LightTally::shares))
+    {
+        let note = format!(
+            "on the audience {:.2} % of what falls (the design {:.2} %), beside it {:.2} % ({:.2} %)",
+            100.0 * machined.on_audience,
+            100.0 * designed.on_audience,
+            100.0 * machined.leak,
+            100.0 * designed.leak
+        );
+        let lost = light_picture::lost(&before.means(), &after.means());
+        let path = staging.join("maps").join(format!("{}-light.png", at.name));
+        picture::write_png(&path, &light_picture::loss(&shape, &lost, &caption(vec![note])))?;
+    }
+    Ok(())
 }
 
 /// What a picture says at its foot.

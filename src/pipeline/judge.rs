@@ -4,11 +4,11 @@
 use rayon::prelude::*;
 
 use super::Error;
-use super::light::Sight;
+use super::light::{self, Sight};
 use crate::compensation::{self, Profile, RowPass, RowTarget};
 use crate::fidelity::cavities::{self, Labelled};
 use crate::fidelity::light::LightTally;
-use crate::fidelity::{self, Cavities, Found, Layers, Tally};
+use crate::fidelity::{self, Cavities, Found, Layers, Pixels, Tally, polish};
 use crate::grid::{Heights, Lattice, Window};
 use crate::progress::Progress;
 use crate::surface::Surface;
@@ -37,6 +37,10 @@ pub struct Case<'a> {
     pub tally: fidelity::Params,
     pub cavities: cavities::Params,
     pub sight: Option<&'a Sight<'a>>,
+    /// Removal of the model of polishing, if its light is wanted.
+    pub polish_mm: Option<f64>,
+    /// Longest side of the pictures that are made on the way, in pixels.
+    pub most_pixels: usize,
 }
 
 /// What was found in one tile.
@@ -49,6 +53,32 @@ pub struct Verdict {
     pub light_designed: LightTally,
     /// For each post.
     pub light_machined: Vec<LightTally>,
+    /// Of the first post's cut, polished by the model.
+    pub light_polished: LightTally,
+    pub pictures: Pictures,
+}
+
+/// Means over pixels of a tile, as the first post cuts it.
+#[derive(Clone)]
+pub struct Pictures {
+    /// Error of the normals in degrees.
+    pub normals: Pixels,
+    /// Shares on the audience of the design and of the cut, if it is a screen.
+    pub light: Option<[Pixels; 2]>,
+}
+
+impl Pictures {
+    fn merge(&mut self, other: &Pictures) {
+        self.normals.merge(&other.normals);
+        if let (Some(mine), Some(theirs)) = (&mut self.light, &other.light) {
+            mine.iter_mut().zip(theirs).for_each(|(mine, theirs)| mine.merge(theirs));
+        }
+    }
+
+    fn part(&self, window: Window) -> Pictures {
+        let light = self.light.as_ref().map(|maps| [maps[0].part(window), maps[1].part(window)]);
+        Pictures { normals: self.normals.part(window), light }
+    }
 }
 
 /// A row of blocks of the tile, lowest first, as the first post cuts it.
@@ -67,6 +97,8 @@ struct Block {
     cuts: Vec<Vec<ProgramCut>>,
     light_designed: LightTally,
     light_machined: Vec<LightTally>,
+    light_polished: LightTally,
+    pictures: Pictures,
 }
 
 /// Judges a tile; `each` receives its rows of blocks from the lowest y up.
@@ -81,6 +113,9 @@ pub fn judge(
         case.posts.iter().map(|programs| vec![ProgramCut::default(); programs.len()]).collect();
     let mut light_designed = LightTally::default();
     let mut light_machined: Vec<LightTally> = case.posts.iter().map(|_| LightTally::default()).collect();
+    let mut light_polished = LightTally::default();
+    let picture = || Pixels::new(lattice.columns, lattice.rows, case.most_pixels);
+    let mut pictures = Pictures { normals: picture(), light: case.sight.map(|_| [picture(), picture()]) };
     let mut cavities = Cavities::new(case.cavities, lattice.window());
     for row in blocks(&lattice) {
         let blocks: Vec<Block> = row
@@ -89,7 +124,7 @@ pub fn judge(
                 if progress.interrupted() {
                     return Err(Error::Interrupted);
                 }
-                let block = case.block(window);
+                let block = case.block(window, &pictures);
                 progress.advance(window.samples() as u64);
                 block
             })
@@ -114,11 +149,21 @@ pub fn judge(
             for (sum, light) in light_machined.iter_mut().zip(&block.light_machined) {
                 sum.merge(light);
             }
+            light_polished.merge(&block.light_polished);
+            pictures.merge(&block.pictures);
             cavities.add(block.labelled)?;
         }
         each(strip)?;
     }
-    Ok(Verdict { tallies, cuts, cavities: cavities.finish(), light_designed, light_machined })
+    Ok(Verdict {
+        tallies,
+        cuts,
+        cavities: cavities.finish(),
+        light_designed,
+        light_machined,
+        light_polished,
+        pictures,
+    })
 }
 
 /// The blocks of a tile, row by row, lowest y first.
@@ -146,11 +191,14 @@ fn paste(strip: &mut Heights, block: &Heights) {
 }
 
 impl Case<'_> {
-    fn block(&self, window: Window) -> Result<Block, Error> {
+    fn block(&self, window: Window, pictures: &Pictures) -> Result<Block, Error> {
         let datum_mm = self.surface.top_mm();
         let lattice = self.surface.lattice();
         let reach = self.cutters.iter().map(Profile::reach).max().unwrap_or(0);
-        let around = self.surface.heights(window.grown((2 * reach).max(1)), datum_mm)?;
+        // Normals need one sample around the block, rays more.
+        let pad = self.polish_mm.map_or(0, |_| polish::reach(lattice.step_mm));
+        let halo = if self.sight.is_some() { light::halo(lattice.step_mm) + pad } else { 1 };
+        let around = self.surface.heights(window.grown((2 * reach).max(halo)), datum_mm)?;
         let design = around.crop(window);
         let cavity = self.cavity(&around, &design);
         let passes = self.exact_passes(&around, window);
@@ -161,19 +209,22 @@ impl Case<'_> {
             cuts: Vec::new(),
             light_designed: LightTally::default(),
             light_machined: Vec::new(),
+            light_polished: LightTally::default(),
+            pictures: pictures.part(window),
             design,
             cavity,
             labelled,
         };
-        let near = around.crop(window.grown(1));
+        let near = around.crop(window.grown(halo));
         drop(around);
         if let Some(sight) = self.sight {
-            sight.add(&mut block.light_designed, &near, window, lattice.step_mm, None);
+            let map = block.pictures.light.as_mut().map(|maps| &mut maps[0]);
+            sight.add(&mut block.light_designed, &near, window, lattice.step_mm, map);
         }
         for (post, programs) in self.posts.iter().enumerate() {
-            let stock = self.blank.heights(self.swept_window(window), lattice.step_mm, 0.0);
+            let stock = self.blank.heights(self.swept_window(window, halo as i64), lattice.step_mm, 0.0);
             let swept = verify::sweep(stock, lattice.step_mm, 0.0, programs);
-            let machined = swept.heights.crop(window.grown(1));
+            let machined = swept.heights.crop(window.grown(halo));
             let mut tally = Tally::new(self.tally);
             let layers = Layers {
                 design: &near,
@@ -181,13 +232,19 @@ impl Case<'_> {
                 cavity: (!self.cutters.is_empty()).then_some(&block.cavity),
                 passes: passes.as_ref(),
             };
-            tally.add(window, layers)?;
+            let normals = (post == 0).then_some(&mut block.pictures.normals);
+            tally.add_with(window, layers, normals)?;
             block.tallies.push(tally);
             block.cuts.push(swept.programs);
             let mut light = LightTally::default();
             if let Some(sight) = self.sight {
                 let part = masked(&machined, &near);
-                sight.add(&mut light, &part, window, lattice.step_mm, None);
+                let map = block.pictures.light.as_mut().filter(|_| post == 0).map(|maps| &mut maps[1]);
+                sight.add(&mut light, &part, window, lattice.step_mm, map);
+                if let Some(removal_mm) = self.polish_mm.filter(|_| post == 0) {
+                    let part = polish::polished(&part, lattice.step_mm, removal_mm);
+                    sight.add(&mut block.light_polished, &part, window, lattice.step_mm, None);
+                }
             }
             block.light_machined.push(light);
             if post == 0 {
@@ -197,25 +254,25 @@ impl Case<'_> {
         Ok(block)
     }
 
-    /// The block and one sample around it; at the tile's edges all of the blank's margin too, so that what is
+    /// The block and `halo` samples around it; at the tile's edges all of the blank's margin too, so that what is
     /// cut there is seen.
-    fn swept_window(&self, window: Window) -> Window {
+    fn swept_window(&self, window: Window, halo: i64) -> Window {
         let lattice = self.surface.lattice();
         let low = |edge: bool, first: i64, axis: usize| {
-            if edge { (self.blank.low_mm[axis] / lattice.step_mm).floor() as i64 } else { first - 1 }
+            if edge { (self.blank.low_mm[axis] / lattice.step_mm).floor() as i64 } else { first - halo }
         };
         let high = |edge: bool, end: i64, axis: usize| {
-            if edge { (self.blank.high_mm[axis] / lattice.step_mm).ceil() as i64 } else { end + 1 }
+            if edge { (self.blank.high_mm[axis] / lattice.step_mm).ceil() as i64 } else { end + halo }
         };
-        let column = low(window.column == 0, window.column, 0).min(window.column - 1);
-        let row = low(window.row == 0, window.row, 1).min(window.row - 1);
+        let column = low(window.column == 0, window.column, 0).min(window.column - halo);
+        let row = low(window.row == 0, window.row, 1).min(window.row - halo);
         let column_end = high(window.column_end() == lattice.columns as i64, window.column_end(), 0);
         let row_end = high(window.row_end() == lattice.rows as i64, window.row_end(), 1);
         Window {
             column,
             row,
-            columns: (column_end.max(window.column_end() + 1) - column) as usize,
-            rows: (row_end.max(window.row_end() + 1) - row) as usize,
+            columns: (column_end.max(window.column_end() + halo) - column) as usize,
+            rows: (row_end.max(window.row_end() + halo) - row) as usize,
         }
     }
 

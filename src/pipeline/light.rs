@@ -1,10 +1,14 @@
 //! The room of a designed screen, as the judge of one tile needs it.
 
 use glam::DVec3;
+use image::RgbImage;
 
-use crate::fidelity::light::{Centres, LightTally, LossMap, Metal, Pose, Room, View};
+use crate::fidelity::Pixels;
+use crate::fidelity::light::{Centres, LightTally, Metal, Pose, ROOM_BINS, Room, View};
 use crate::grid::{Heights, Lattice, Window};
-use crate::report::Light;
+use crate::report::light_picture::{self, Hemisphere};
+use crate::report::picture::Caption;
+use crate::report::{Light, Polished};
 use crate::screen::Scene;
 
 /// Points across a tile from which the audience is looked at.
@@ -42,7 +46,7 @@ impl Sight<'_> {
         heights: &Heights,
         window: Window,
         step_mm: f64,
-        map: Option<&mut LossMap>,
+        map: Option<&mut Pixels>,
     ) {
         tally.add(heights, window, step_mm, &self.pose, &self.room(), map);
     }
@@ -70,6 +74,26 @@ pub fn view(scene: &Scene, points_m: &[DVec3]) -> View {
     View::from_points(points_m, &|point, out| scene.audience_hit(point, out))
 }
 
+/// Where in the room the light of a design and of its cut goes; `middle_m` is the place it is seen from.
+pub fn room_picture(
+    scene: &Scene,
+    middle_m: DVec3,
+    designed: &LightTally,
+    machined: &LightTally,
+    caption: &Caption,
+) -> RgbImage {
+    let [before, after] = [designed, machined].map(LightTally::room_gain);
+    let hemispheres = [("design", &before), ("as cut", &after)].map(|(title, gain)| Hemisphere {
+        title,
+        gain,
+        bins: ROOM_BINS,
+    });
+    let edges = scene.audience.iter().flat_map(|polyhedron| polyhedron.edges());
+    let outlines: Vec<[[f64; 3]; 2]> =
+        edges.map(|(ends, _)| ends.map(|end| (end - middle_m).to_array())).collect();
+    light_picture::room(&hemispheres, &outlines, caption)
+}
+
 /// The figures of `report.json` for a design and its cut.
 pub fn summary(designed: &LightTally, machined: &LightTally, view: &View) -> Option<Light> {
     let (before, after) = (designed.shares()?, machined.shares()?);
@@ -89,5 +113,20 @@ pub fn summary(designed: &LightTally, machined: &LightTally, view: &View) -> Opt
         shadowed_designed: designed.shadowed_fraction(),
         shadowed_machined: machined.shadowed_fraction(),
         standard_error: machined.standard_error(),
+        polished: None,
+    })
+}
+
+/// The figures of a polished cut.
+pub fn polished(light: &LightTally, removal_mm: f64, view: &View) -> Option<Polished> {
+    let shares = light.shares()?;
+    Some(Polished {
+        removal_um: 1e3 * removal_mm,
+        on_audience: shares.on_audience,
+        leak: shares.leak,
+        absorbed: shares.absorbed,
+        unresolved: shares.unresolved,
+        gain: light.gain(view),
+        uniformity: light.uniformity(view),
     })
 }

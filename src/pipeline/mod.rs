@@ -30,6 +30,7 @@ pub use check::{Checked, Reach, check};
 pub use cut::{Milled, mill};
 pub use error::Error;
 pub use estimate::{Estimated, estimate};
+pub use light::room_picture;
 pub use machine_calibration::{
     Calibrated, Error as CalibrationError, Measured, calibrate as calibrate_machine,
     programs as programs_to_measure,

@@ -63,6 +63,21 @@ fn page<'a>(
                 map_file: map_file.clone(),
             });
         }
+        for (name, made) in [("normals", true), ("light", result.verdict.pictures.light.is_some())] {
+            let file = format!("maps/{tile}-{name}.png");
+            if made {
+                pictures.push(Picture {
+                    tile: tile.clone(),
+                    name: name.into(),
+                    map_file: file.clone(),
+                    file,
+                });
+            }
+        }
+    }
+    if report.light.is_some() {
+        let file = super::report::ROOM_PICTURE.to_string();
+        pictures.push(Picture { tile: "all".into(), name: "light".into(), map_file: file.clone(), file });
     }
     let mut cavities = Vec::new();
     let mut listed = 0;

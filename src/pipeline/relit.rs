@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use super::Error;
 use super::judge::blocks;
 use super::light::{self, Sight};
-use crate::fidelity::light::{Centres, LightTally, LossMap, Plane, Pose, Shares, planes};
+use crate::fidelity::light::{Centres, LightTally, Plane, Pose, Shares, planes};
+use crate::fidelity::{Pixels, polish};
 use crate::grid::{Lattice, Window};
 use crate::progress::Progress;
 use crate::report::Light;
@@ -31,6 +32,8 @@ pub struct Relit {
     pub pixel_mm: Option<f64>,
     pub scene: PathBuf,
     pub far_field: bool,
+    /// Removal of the model of polishing.
+    pub polish_um: Option<f64>,
 }
 
 /// Where the light goes.
@@ -41,7 +44,7 @@ pub struct Lit {
     pub by_planes: Shares,
     pub notes: Vec<String>,
     /// Of the design, then of the surface.
-    pub maps: [LossMap; 2],
+    pub maps: [Pixels; 2],
     pub tallies: [LightTally; 2],
     pub scene: Scene,
     pub middle_m: DVec3,
@@ -93,24 +96,33 @@ pub fn relit(case: &Relit, progress: &dyn Progress) -> Result<Lit, Error> {
         far_field: case.far_field.then_some(&centres),
     };
     let by_planes = of_planes(&designed, &design, &sight).ok_or(Error::NoLightFalls)?;
-    let mut maps = [0, 1].map(|_| LossMap::new(lattice.columns, lattice.rows, MOST_PIXELS));
+    let mut maps = [0, 1].map(|_| Pixels::new(lattice.columns, lattice.rows, MOST_PIXELS));
     let mut tallies = [LightTally::default(), LightTally::default()];
     progress.begin("light", 2 * (lattice.columns * lattice.rows) as u64);
+    let halo = light::halo(lattice.step_mm);
+    let polish_mm = case.polish_um.map(|um| 1e-3 * um);
+    let mut after_polish = LightTally::default();
     let surfaces: [(&dyn Surface, f64); 2] = [(&designed, top_mm), (cut.as_ref(), cut_datum_mm)];
-    for ((surface, datum_mm), (tally, map)) in surfaces.into_iter().zip(tallies.iter_mut().zip(&mut maps)) {
+    for (index, (surface, datum_mm)) in surfaces.into_iter().enumerate() {
+        let (tally, map) = (&mut tallies[index], &mut maps[index]);
         for window in blocks(&lattice).into_iter().flatten() {
             if progress.interrupted() {
                 return Err(Error::Interrupted);
             }
-            let around = window.grown(light::halo(lattice.step_mm));
-            let heights = surface.heights(around, datum_mm)?;
+            let heights = surface.heights(window.grown(halo), datum_mm)?;
             sight.add(tally, &heights, window, lattice.step_mm, Some(map));
+            if let (1, Some(removal_mm)) = (index, polish_mm) {
+                let around = window.grown(halo + polish::reach(lattice.step_mm));
+                let wide = polish::polished(&surface.heights(around, datum_mm)?, lattice.step_mm, removal_mm);
+                sight.add(&mut after_polish, &wide.crop(heights.window), window, lattice.step_mm, None);
+            }
             progress.advance(window.samples() as u64);
         }
     }
     let middle_m = sight.pose.point_m(DVec3::new(0.5 * lattice.width_mm, 0.5 * lattice.height_mm, 0.0));
     let view = light::view(&scene, &light::points(&sight.pose, &lattice));
-    let light = light::summary(&tallies[0], &tallies[1], &view).ok_or(Error::NoLightFalls)?;
+    let mut light = light::summary(&tallies[0], &tallies[1], &view).ok_or(Error::NoLightFalls)?;
+    light.polished = polish_mm.and_then(|removal_mm| light::polished(&after_polish, removal_mm, &view));
     Ok(Lit { lattice, light, by_planes, notes, maps, tallies, middle_m, scene })
 }
 

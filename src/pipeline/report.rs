@@ -12,9 +12,13 @@ use crate::fidelity::{Figures, Tally};
 use crate::job::{Form, Job};
 use crate::machine::Guard;
 use crate::report::cavity_list::{self, TileCavities};
+use crate::report::picture::{Caption, write_png};
 use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
 use crate::tolerance::Budget;
-use crate::verify::ProgramCut;
+use crate::verify::{Judged, Language, ProgramCut};
+
+/// Where in the room the light of the whole job goes.
+pub(super) const ROOM_PICTURE: &str = "maps/light-room.png";
 
 /// Writes everything but the programs and maps, which are there already, and gives the verdict.
 pub fn finish(
@@ -56,7 +60,7 @@ pub fn finish(
     }
     let figures = whole.figures();
     report.fidelity = budget.map(|budget| Fidelity::of(&figures, shares(&budget), Some(cavities)));
-    report.light = of_light(part, job, &results);
+    report.light = of_light(part, job, &results, staging)?;
     times(job, shop, &results, &mut report);
     for found in of_limits(job, &report, &figures) {
         report.finding(found);
@@ -266,6 +270,28 @@ fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Finding> {
         );
         found.push(finding(Severity::Note, "sections", message));
     }
+    // RML-1 has no rapid word, so that its travel above the part is a feed like any other.
+    let gcode = program.reading.summary.language == Language::GCode;
+    let feeds = Judged::new(&program.reading, tool.shape, [0.0; 3]).feeds();
+    for (fastest, most, key) in [
+        (feeds.lateral, tool.feed_mm_min, "feed_mm_min"),
+        (feeds.plunge, tool.plunge_mm_min, "plunge_mm_min"),
+    ] {
+        if let Some(fastest) = fastest.filter(|fastest| gcode && fastest.feed_mm_min > most + 1e-3) {
+            let message = format!(
+                "{file}:{}: feeds {} mm/min, the {key} of {} is {most}",
+                fastest.line, fastest.feed_mm_min, tool.name
+            );
+            found.push(finding(Severity::Warning, "feed", message));
+        }
+    }
+    if let Some(bite) = cut.plunge.filter(|bite| bite.depth_mm > tool.shape.radius_mm()) {
+        let message = format!(
+            "{file}:{}: plunges {:.3} mm straight down into solid, more than the radius of {}; hint: a smaller stepdown",
+            bite.line, bite.depth_mm, tool.name
+        );
+        found.push(finding(Severity::Warning, "plunge", message));
+    }
     for note in &program.reading.summary.notes {
         found.push(finding(Severity::Note, "program", format!("{file}: {note}")));
     }
@@ -315,18 +341,38 @@ fn tile(job: &Job, shop: &Shop, result: &TileResult) -> report::Tile {
     }
 }
 
-/// The light of all tiles together, before and after.
-fn of_light(part: &Part, job: &Job, results: &[TileResult]) -> Option<report::Light> {
-    let scene = part.scene.as_ref()?;
-    let (mut designed, mut machined) = (LightTally::default(), LightTally::default());
+/// The light of all tiles together, before and after, and its picture.
+fn of_light(
+    part: &Part,
+    job: &Job,
+    results: &[TileResult],
+    staging: &Path,
+) -> Result<Option<report::Light>, Error> {
+    let Some(scene) = &part.scene else { return Ok(None) };
+    let [mut designed, mut machined, mut polished] = [(); 3].map(|()| LightTally::default());
     let mut points = Vec::new();
     for result in results {
+        let (Some(pose), Some(light)) =
+            (part.pose(job, &result.tile.piece), result.verdict.light_machined.first())
+        else {
+            return Ok(None);
+        };
         designed.merge(&result.verdict.light_designed);
-        machined.merge(result.verdict.light_machined.first()?);
-        let pose = part.pose(job, &result.tile.piece)?;
+        machined.merge(light);
+        polished.merge(&result.verdict.light_polished);
         points.extend(light::points(&pose, &result.tile.surface().lattice()));
     }
-    light::summary(&designed, &machined, &light::view(scene, &points))
+    let view = light::view(scene, &points);
+    let mut light = light::summary(&designed, &machined, &view);
+    if let Some(light) = &mut light {
+        light.polished =
+            job.polish.and_then(|polish| light::polished(&polished, 1e-3 * polish.removal_um, &view));
+        let middle_m = points.iter().sum::<glam::DVec3>() / points.len() as f64;
+        let caption = Caption { part: job.name.clone(), ..Caption::default() };
+        let picture = light::room_picture(scene, middle_m, &designed, &machined, &caption);
+        write_png(&staging.join(ROOM_PICTURE), &picture)?;
+    }
+    Ok(light)
 }
 
 /// Machine time of the first post's programs; the other posts are the same work in other words.

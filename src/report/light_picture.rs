@@ -21,8 +21,26 @@ const DECADES: f64 = 4.0;
 /// Angles from straight ahead that are drawn as circles, in degrees.
 const CIRCLES: [f64; 4] = [15.0, 30.0, 45.0, 60.0];
 
-/// Shares of light over the tile: `lost` is the design's share on the audience less the cut's, row 0 lowest.
-pub fn loss(columns: usize, rows: usize, pitch_mm: f64, lost: &[f32], caption: &Caption) -> RgbImage {
+/// What the cut's share on the audience lacks of the design's, by pixels.
+pub fn lost(designed: &[f64], machined: &[f64]) -> Vec<f32> {
+    designed.iter().zip(machined).map(|(before, after)| lacks(before - after)).collect()
+}
+
+/// Not below 0; NaN stays.
+fn lacks(part: f64) -> f32 {
+    if part < 0.0 { 0.0 } else { part as f32 }
+}
+
+/// A picture's pixels, row 0 the lowest.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    pub columns: usize,
+    pub rows: usize,
+    pub pitch_mm: f64,
+}
+
+/// [`lost`] light over a tile.
+pub fn loss(frame: &Frame, lost: &[f32], caption: &Caption) -> RgbImage {
     let look = Look {
         title: "Light that the design sends to the audience and the cut does not",
         bar_title: "lost",
@@ -32,8 +50,27 @@ pub fn loss(columns: usize, rows: usize, pitch_mm: f64, lost: &[f32], caption: &
         palette: Palette::cavities(),
         shaded: false,
     };
-    let raster = Raster { columns, rows, pitch_mm, z_mm: lost };
-    Sheet::new(&raster, caption).draw(&look, &raster, caption)
+    draw(frame, lost, &look, caption)
+}
+
+/// Mean errors of the normals in degrees over a tile.
+pub fn normals(frame: &Frame, degrees: &[f32], caption: &Caption) -> RgbImage {
+    let look = Look {
+        title: "Error of the machined surface's normals",
+        bar_title: "error",
+        ends: ["", "off"],
+        pixel: "mean error",
+        scale: Scale::degrees(degrees),
+        palette: Palette::cavities(),
+        shaded: false,
+    };
+    draw(frame, degrees, &look, caption)
+}
+
+fn draw(frame: &Frame, values: &[f32], look: &Look, caption: &Caption) -> RgbImage {
+    let Frame { columns, rows, pitch_mm } = *frame;
+    let raster = Raster { columns, rows, pitch_mm, z_mm: values };
+    Sheet::new(&raster, caption).draw(look, &raster, caption)
 }
 
 /// One hemisphere of outgoing light.

@@ -22,8 +22,8 @@ mod test_image;
 
 pub use files::{write_json, write_whole};
 pub use schema::{
-    Bounds, ByCause, Fidelity, Finding, GougeBudget, Light, MapFiles, Part, Parts, Program, Report, Severity,
-    Tile, Times, Verdict, finding,
+    Bounds, ByCause, Fidelity, Finding, GougeBudget, Light, MapFiles, Part, Parts, Polished, Program, Report,
+    Severity, Tile, Times, Verdict, finding,
 };
 
 /// Why something could not be shown.

@@ -406,7 +406,7 @@ impl Sheet {
             (low.min(f64::from(value)), high.max(f64::from(value)))
         });
         if lowest <= highest {
-            let decimals = if unit == "mm" { 3 } else { 1 };
+            let decimals = if per_mm == 1.0 { 3 } else { 1 };
             let range = format!("{:.decimals$} to {:.decimals$} {unit}", lowest * per_mm, highest * per_mm);
             let y = top + height + if low.is_empty() { 8 } else { 30 };
             self.text(SOFT_INK, left, y, 16.0, &range.replace('-', "\u{2212}"));

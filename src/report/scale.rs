@@ -18,8 +18,16 @@ pub struct Scale {
     pub high_mm: f64,
     /// Shows micrometres beside tenths of a millimetre: colours go by the square root.
     pub by_root: bool,
-    /// Parts of a whole rather than mm.
-    pub percent: bool,
+    pub quantity: Quantity,
+}
+
+/// What the figures of a scale are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    Length,
+    /// Parts of a whole.
+    Part,
+    Degrees,
 }
 
 impl Scale {
@@ -29,30 +37,38 @@ impl Scale {
         let low_mm = quantile(&sorted, 0.002);
         let high_mm = quantile(&sorted, 0.998);
         let lack_mm = 0.5 * (1e-4 - (high_mm - low_mm)).max(0.0);
-        Scale { low_mm: low_mm - lack_mm, high_mm: high_mm + lack_mm, by_root: false, percent: false }
+        Scale {
+            low_mm: low_mm - lack_mm,
+            high_mm: high_mm + lack_mm,
+            by_root: false,
+            quantity: Quantity::Length,
+        }
     }
 
     /// From 0 to a round figure that 99.5 % of the values above `floor_mm` stay below.
     pub fn from_zero(values: &[f32], floor_mm: f32) -> Scale {
         let sorted = sorted(values.iter().copied().filter(|&value| value > floor_mm));
         let high_mm = round_up(quantile(&sorted, 0.995).max(1e-4));
-        Scale { low_mm: 0.0, high_mm, by_root: true, percent: false }
+        Scale { low_mm: 0.0, high_mm, by_root: true, quantity: Quantity::Length }
     }
 
     /// Parts of a whole from 0 to a round figure that 99.5 % of the values stay below, 1 at most.
     pub fn parts(values: &[f32]) -> Scale {
-        Scale {
-            percent: true,
-            high_mm: Scale::from_zero(values, 0.0).high_mm.clamp(1e-3, 1.0),
-            ..Scale::from_zero(&[], 0.0)
-        }
+        let high_mm = Scale::from_zero(values, 0.0).high_mm.clamp(1e-3, 1.0);
+        Scale { low_mm: 0.0, high_mm, by_root: true, quantity: Quantity::Part }
+    }
+
+    /// Degrees from 0 to a round figure that 99.5 % of the values stay below.
+    pub fn degrees(values: &[f32]) -> Scale {
+        let high_mm = Scale::from_zero(values, 0.0).high_mm.max(0.01);
+        Scale { low_mm: 0.0, high_mm, by_root: true, quantity: Quantity::Degrees }
     }
 
     /// As far below 0 as above, to a round figure that 99.5 % of |values| stay below.
     pub fn about_zero(values: &[f32]) -> Scale {
         let sorted = sorted(values.iter().map(|value| value.abs()));
         let high_mm = round_up(quantile(&sorted, 0.995).max(1e-4));
-        Scale { low_mm: -high_mm, high_mm, by_root: true, percent: false }
+        Scale { low_mm: -high_mm, high_mm, by_root: true, quantity: Quantity::Length }
     }
 
     /// Where a value stands between the ends, 0 to 1 within them.
@@ -63,8 +79,10 @@ impl Scale {
 
     /// Name of the unit and how many of it make a millimetre.
     pub fn unit(&self) -> (&'static str, f64) {
-        if self.percent {
-            return ("%", 100.0);
+        match self.quantity {
+            Quantity::Part => return ("%", 100.0),
+            Quantity::Degrees => return ("degrees", 1.0),
+            Quantity::Length => {}
         }
         if self.low_mm.abs().max(self.high_mm.abs()) < 0.9 { ("µm", 1000.0) } else { ("mm", 1.0) }
     }
@@ -122,7 +140,7 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        let scale = Scale { low_mm: -0.02, high_mm: 0.02, by_root: false, percent: false };
+        let scale = Scale { low_mm: -0.02, high_mm: 0.02, by_root: false, quantity: Quantity::Length };
         let labels: Vec<String> = scale.ticks(4).into_iter().map(|(_, label)| label).collect();
         assert_eq!(labels, ["\u{2212}20", "\u{2212}10", "0", "10", "20"]);
         assert_eq!(scale.unit().0, "µm");

@@ -212,6 +212,21 @@ pub struct Light {
     /// Of the share on the audience, where a rough metal's directions are drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
+    /// After polishing, by the model that the job asks for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polished: Option<Polished>,
+}
+
+/// Where the light of a polished cut goes, by a model of polishing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Polished {
+    pub removal_um: f64,
+    pub on_audience: f64,
+    pub leak: f64,
+    pub absorbed: f64,
+    pub unresolved: f64,
+    pub gain: Option<f64>,
+    pub uniformity: Option<f64>,
 }
 
 /// Machine time in seconds.

@@ -42,6 +42,18 @@ impl Silhouette {
         Silhouette { bodies }
     }
 
+    /// For every body the edges of its outline, a x b and b - a each, if all have one here: a ray meets a body if
+    /// direction . (a x b - place x (b - a)) is 0 or more for all of them.
+    pub fn outlines(&self) -> Option<Vec<&[[DVec3; 2]]>> {
+        self.bodies
+            .iter()
+            .map(|body| match body {
+                Body::Outline(edges) => Some(edges.as_slice()),
+                Body::Faces(_) => None,
+            })
+            .collect()
+    }
+
     /// Whether the ray from `place_m` along `direction`, of any length, meets the audience.
     #[inline]
     pub fn met(&self, place_m: DVec3, direction: DVec3) -> bool {

@@ -4,6 +4,7 @@
 mod body;
 mod contact;
 mod error;
+mod feeds;
 mod gcode;
 mod judged;
 mod reading;
@@ -14,6 +15,7 @@ mod time;
 
 pub use body::{BodyHit, body_hits};
 pub use error::{Error, Place};
+pub use feeds::{Fastest, Feeds};
 pub use judged::{Blank, Judged, LateralRapid};
 pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary, Travel};
 pub use sweep::{Bite, ProgramCut, Swept, sweep};

@@ -96,6 +96,7 @@ pub fn report() -> Report {
         shadowed_designed: Some(0.0),
         shadowed_machined: Some(0.0),
         standard_error: None,
+        polished: None,
     });
     report.time_s = Times {
         total: 155_651.0,

@@ -39,6 +39,10 @@ impl Metal {
         Metal { lobe: None, diffuse: 0.0, ..*self }
     }
 
+    pub(super) fn index(&self) -> ComplexIndex {
+        self.index
+    }
+
     /// Whether light from one direction leaves in one direction.
     pub fn is_mirror(&self) -> bool {
         self.lobe.is_none() && self.diffuse == 0.0

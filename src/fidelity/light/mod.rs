@@ -8,13 +8,14 @@
 mod metal;
 mod planes;
 mod relief;
+mod row;
 mod tally;
 mod view;
 
 pub use metal::Metal;
 pub use planes::{Plane, planes};
 pub use relief::{End, Relief};
-pub use tally::{LightTally, LossMap, ROOM_BINS, Shares};
+pub use tally::{LightTally, ROOM_BINS, Shares};
 pub use view::View;
 
 use glam::{DMat3, DVec3};

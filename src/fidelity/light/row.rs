@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::Stage;
 use super::relief::Relief;
-use super::view::ROOM_BINS;
+use super::tally::ROOM_BINS;
 use crate::grid::Heights;
 
 /// Samples that are worked on together; what is kept of them stays in the processor's first cache.

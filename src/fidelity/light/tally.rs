@@ -2,8 +2,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::metal::draw;
+use super::row::Chunk;
 use super::view::{BINS, bin_of};
 use super::{End, Pose, Relief, Room, Stage, View};
+use crate::fidelity::pixels::{Line, Pixels};
 use crate::grid::{Heights, Window};
 
 /// Bounces that are followed; light that has not left by then is unresolved.
@@ -43,8 +45,9 @@ pub struct LightTally {
     leak: f64,
     absorbed: f64,
     unresolved: f64,
-    bins: Vec<f64>,
+    /// Light by direction, [`ROOM_BINS`] squared: all that leaves, and what meets the audience.
     room: Vec<f64>,
+    met: Vec<f64>,
 }
 
 impl Default for LightTally {
@@ -58,53 +61,17 @@ impl Default for LightTally {
             leak: 0.0,
             absorbed: 0.0,
             unresolved: 0.0,
-            bins: vec![0.0; BINS * BINS],
             room: vec![0.0; ROOM_BINS * ROOM_BINS],
-        }
-    }
-}
-
-/// Incident light and light on the audience over squares of samples, for a picture of where it is lost.
-#[derive(Clone, Debug)]
-pub struct LossMap {
-    /// Samples along a side of a pixel.
-    pub factor: usize,
-    pub columns: usize,
-    pub rows: usize,
-    incident: Vec<f64>,
-    on_audience: Vec<f64>,
-}
-
-impl LossMap {
-    /// Nothing yet, for this many samples; no side longer than `most` pixels.
-    pub fn new(columns: usize, rows: usize, most: usize) -> LossMap {
-        let factor = columns.max(rows).div_ceil(most).max(1);
-        let (columns, rows) = (columns.div_ceil(factor), rows.div_ceil(factor));
-        let zero = vec![0.0; columns * rows];
-        LossMap { factor, columns, rows, incident: zero.clone(), on_audience: zero }
-    }
-
-    /// Share of the incident light on the audience in a pixel; NaN where none fell. Row 0 is the lowest.
-    pub fn share(&self, column: usize, row: usize) -> f64 {
-        let at = row * self.columns + column;
-        self.on_audience[at] / self.incident[at]
-    }
-
-    /// Adds a row's light by pixels, from the pixel of column `first` on.
-    fn add(&mut self, row: i64, first: i64, light: &[[f64; 2]]) {
-        let start = row as usize / self.factor * self.columns + first as usize / self.factor;
-        for (offset, [incident, on_audience]) in light.iter().enumerate() {
-            self.incident[start + offset] += incident;
-            self.on_audience[start + offset] += on_audience;
+            met: vec![0.0; ROOM_BINS * ROOM_BINS],
         }
     }
 }
 
 /// One band's sums, and its rows' light by pixels of the map if one is wanted.
-type Band = (LightTally, Vec<Vec<[f64; 2]>>);
+type Band = (LightTally, Vec<Line>);
 
 impl LightTally {
-    /// Adds the samples of `window`; `heights` covers it with a halo of one sample or more where there is data. Rays
+    /// Adds the samples of `window`, and to a map of shares on the audience if there is one; `heights` covers it with a halo of one sample or more where there is data. Rays
     /// are followed as far as `heights` reaches.
     pub fn add(
         &mut self,
@@ -113,7 +80,7 @@ impl LightTally {
         step_mm: f64,
         pose: &Pose,
         room: &Room,
-        mut map: Option<&mut LossMap>,
+        mut map: Option<&mut Pixels>,
     ) {
         let relief = Relief::new(heights, step_mm, room.steepest);
         let (columns, rows) = (window.columns as f64 * step_mm, window.rows as f64 * step_mm);
@@ -129,28 +96,44 @@ impl LightTally {
         let stage = Stage::new(room, pose, middle_mm, within_mm);
         let ground = Ground { heights, step_mm };
         let starts: Vec<i64> = (window.row..window.row_end()).step_by(BAND_ROWS).collect();
-        let factor = map.as_ref().map(|map| map.factor as i64);
+        // One sample at a time where directions are drawn, or stand at a cell's centre.
+        let plain = room.metal.is_mirror() && room.far_field.is_none();
+        let outlines = if plain { stage.silhouette.outlines() } else { None };
+        let map_of = map.as_deref();
         let bands: Vec<Band> = starts
             .into_par_iter()
             .map(|first| {
                 let mut tally = LightTally { drawn: !room.metal.is_mirror(), ..LightTally::default() };
                 let mut light = Vec::new();
+                let mut chunk = Chunk::new();
                 for row in first..(first + BAND_ROWS as i64).min(window.row_end()) {
-                    let Some(factor) = factor else {
-                        for column in window.column..window.column_end() {
-                            tally.sample(&ground, &relief, &stage, column, row);
+                    let mut line = map_of.map(|map| map.line(window));
+                    let mut column = window.column;
+                    while column < window.column_end() {
+                        let end = (column + Chunk::SAMPLES as i64).min(window.column_end());
+                        match &outlines {
+                            Some(outlines) if ground.surrounded(column, end, row) => {
+                                let count = (end - column) as usize;
+                                chunk.fill((heights, &relief, &stage), outlines, row, column, count);
+                                tally.chunk(
+                                    &chunk,
+                                    (&ground, &relief, &stage),
+                                    row,
+                                    column,
+                                    count,
+                                    &mut line,
+                                );
+                            }
+                            _ => {
+                                for column in column..end {
+                                    let light = tally.sample(&ground, &relief, &stage, column, row);
+                                    line.iter_mut().for_each(|line| line.add(column, light));
+                                }
+                            }
                         }
-                        continue;
-                    };
-                    let pixel = |column: i64| (column / factor - window.column / factor) as usize;
-                    let mut line = vec![[0.0; 2]; pixel(window.column_end() - 1) + 1];
-                    for column in window.column..window.column_end() {
-                        let [taken, arrived] = tally.sample(&ground, &relief, &stage, column, row);
-                        let [incident, on_audience] = &mut line[pixel(column)];
-                        *incident += taken;
-                        *on_audience += arrived;
+                        column = end;
                     }
-                    light.push(line);
+                    light.extend(line);
                 }
                 (tally, light)
             })
@@ -160,7 +143,7 @@ impl LightTally {
             self.merge(tally);
             for line in light {
                 if let Some(map) = map.as_deref_mut() {
-                    map.add(row, window.column, line);
+                    map.add(row, line);
                 }
                 row += 1;
             }
@@ -177,11 +160,43 @@ impl LightTally {
         self.leak += other.leak;
         self.absorbed += other.absorbed;
         self.unresolved += other.unresolved;
-        for (sum, bin) in self.bins.iter_mut().zip(&other.bins) {
+        for (sum, bin) in self.met.iter_mut().zip(&other.met) {
             *sum += bin;
         }
         for (sum, bin) in self.room.iter_mut().zip(&other.room) {
             *sum += bin;
+        }
+    }
+
+    /// Adds samples that were worked out together, and looks at the others by themselves.
+    fn chunk(
+        &mut self,
+        chunk: &Chunk,
+        (ground, relief, stage): (&Ground, &Relief, &Stage),
+        row: i64,
+        column: i64,
+        count: usize,
+        line: &mut Option<Line>,
+    ) {
+        for k in 0..count {
+            let light = if chunk.done[k] {
+                let (taken, reflected, bin) = (chunk.taken[k], chunk.reflected[k], chunk.bin[k] as usize);
+                self.samples += 1;
+                self.incident += taken;
+                self.absorbed += taken - reflected;
+                let met = chunk.met[k] >= 0.0;
+                let arrived = if met { reflected } else { 0.0 };
+                self.on_audience += arrived;
+                self.leak += reflected - arrived;
+                self.room[bin] += reflected;
+                self.met[bin] += arrived;
+                [taken, arrived]
+            } else {
+                self.sample(ground, relief, stage, column + k as i64, row)
+            };
+            if let Some(line) = line {
+                line.add(column + k as i64, light);
+            }
         }
     }
 
@@ -208,11 +223,11 @@ impl LightTally {
             match relief.end(column, row, way.out) {
                 End::Clear => {
                     let out = stage.rotation * way.out;
-                    let (x, y) = (bin_of(out.x, ROOM_BINS), bin_of(out.y, ROOM_BINS));
-                    self.room[x + ROOM_BINS * y] += left;
+                    let bin = bin_of(out.x, ROOM_BINS) + ROOM_BINS * bin_of(out.y, ROOM_BINS);
+                    self.room[bin] += left;
                     if stage.silhouette.met(place_m, way.out) {
                         self.on_audience += left;
-                        self.bins[x / FINE + BINS * (y / FINE)] += left;
+                        self.met[bin] += left;
                         return [taken, left];
                     }
                     self.leak += left;
@@ -273,8 +288,12 @@ impl LightTally {
     /// 1 - (standard deviation / mean) of the luminance over the bins of direction that the audience fills.
     pub fn uniformity(&self, view: &View) -> Option<f64> {
         let bin_sr = (2.0 / BINS as f64).powi(2);
+        let mut bins = vec![0.0; BINS * BINS];
+        for (at, flux) in self.met.iter().enumerate() {
+            bins[at % ROOM_BINS / FINE + BINS * (at / ROOM_BINS / FINE)] += flux;
+        }
         let (mut weight, mut sum, mut squares) = (0.0, 0.0, 0.0);
-        for (flux, area) in self.bins.iter().zip(&view.bins_sr) {
+        for (flux, area) in bins.iter().zip(&view.bins_sr) {
             if *area < FILLED * bin_sr {
                 continue;
             }
@@ -304,6 +323,12 @@ impl Ground<'_> {
         } else {
             f64::NAN
         }
+    }
+
+    /// Whether samples of a row have neighbours within the heights on every side.
+    fn surrounded(&self, column: i64, end: i64, row: i64) -> bool {
+        let window = &self.heights.window;
+        column > window.column && end < window.column_end() && row > window.row && row + 1 < window.row_end()
     }
 
     /// A sample's place in mm and the normal (-z_x, -z_y, 1) there; None without data or neighbours.
@@ -435,6 +460,45 @@ mod tests {
     }
 
     #[test]
+    fn samples_together_are_samples_by_themselves() {
+        let window = Window { column: -7, row: 3, columns: 330, rows: 70 };
+        let mut steps =
+            heights(window, |x, y| 0.02 * (9.0 * x).sin() * (7.0 * y).cos() + 0.03 * (2.0 * x).floor());
+        steps.z_mm[330 * 40 + 100] = f32::NAN;
+        let audience = [body(DVec3::new(0.3, 0.1, 3.0), 0.4), body(DVec3::new(-1.0, 0.2, 3.5), 0.5)];
+        let rotation = DMat3::from_rotation_x(0.1) * DMat3::from_rotation_y(-0.15);
+        let pose = Pose { origin_m: DVec3::new(0.1, -0.2, 0.05), rotation };
+        let metal = Metal::new(ALUMINIUM, None, 0.0);
+        let projector_m = DVec3::new(0.2, 0.1, 3.0);
+        let room = Room { projector_m, audience: &audience, metal, steepest: 0.3, far_field: None };
+        let inner = Window { column: -6, row: 4, columns: 328, rows: 68 };
+        let mut together = LightTally::default();
+        together.add(&steps, inner, 0.01, &pose, &room, None);
+        let relief = Relief::new(&steps, 0.01, 0.3);
+        let stage = Stage::new(&room, &pose, DVec3::new(1.0, 0.5, 0.0), 5.0);
+        let ground = Ground { heights: &steps, step_mm: 0.01 };
+        let mut alone = LightTally::default();
+        for row in inner.row..inner.row_end() {
+            for column in inner.column..inner.column_end() {
+                alone.sample(&ground, &relief, &stage, column, row);
+            }
+        }
+        assert_eq!((together.samples, together.shadowed), (alone.samples, alone.shadowed));
+        let (a, b) = (together.shares().expect("light fell"), alone.shares().expect("light fell"));
+        for (a, b) in [
+            (a.on_audience, b.on_audience),
+            (a.leak, b.leak),
+            (a.absorbed, b.absorbed),
+            (a.unresolved, b.unresolved),
+        ] {
+            assert!((a - b).abs() < 1e-10, "{a} {b}");
+        }
+        assert!(a.on_audience > 0.005 && a.leak > 0.05, "{a:?}");
+        let apart: f64 = together.room.iter().zip(&alone.room).map(|(a, b)| (a - b).abs()).sum();
+        assert!(apart < 1e-6 * together.incident, "{apart}");
+    }
+
+    #[test]
     fn a_map_holds_what_the_sums_hold() {
         let window = Window { column: 0, row: 0, columns: 120, rows: 90 };
         let bumps = heights(window, |x, y| 0.01 * (20.0 * x).sin() * (15.0 * y).cos());
@@ -443,15 +507,15 @@ mod tests {
         let metal = Metal::new(ALUMINIUM, None, 0.0);
         let projector_m = DVec3::new(0.0, 0.0, 5.0);
         let room = Room { projector_m, audience: &audience, metal, steepest: 0.3, far_field: None };
-        let (mut tally, mut map) = (LightTally::default(), LossMap::new(120, 90, 50));
+        let (mut tally, mut map) = (LightTally::default(), Pixels::new(120, 90, 50));
         for column in [0, 64] {
             let part = Window { column, columns: if column == 0 { 64 } else { 56 }, ..window };
             tally.add(&bumps, part, 0.01, &pose, &room, Some(&mut map));
         }
         assert_eq!((map.factor, map.columns, map.rows), (3, 40, 30));
-        let total = |values: &[f64]| values.iter().sum::<f64>();
-        assert!((total(&map.incident) - tally.incident).abs() < 1e-9 * tally.incident);
-        assert!((total(&map.on_audience) - tally.on_audience).abs() < 1e-9 * tally.incident);
+        let [on_audience, incident] = map.total();
+        assert!((incident - tally.incident).abs() < 1e-9 * tally.incident);
+        assert!((on_audience - tally.on_audience).abs() < 1e-9 * tally.incident);
         let room: f64 = tally.room.iter().sum();
         assert!((room - tally.on_audience - tally.leak).abs() < 1e-9 * tally.incident);
     }

@@ -1,0 +1,129 @@
+use crate::grid::Window;
+
+/// Weighted means over squares of samples, for a picture of a tile or of a part of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pixels {
+    /// Samples along a side of a pixel.
+    pub factor: usize,
+    pub columns: usize,
+    pub rows: usize,
+    /// First pixel's column and row in the picture.
+    first: [usize; 2],
+    /// Of value times weight.
+    sums: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+/// Sums and weights of the pixels that a row of samples lies in.
+pub(super) struct Line {
+    factor: i64,
+    first: i64,
+    pixels: Vec<[f64; 2]>,
+}
+
+impl Line {
+    /// Adds a value times its weight, and the weight, at a column.
+    #[inline]
+    pub fn add(&mut self, column: i64, [weight, sum]: [f64; 2]) {
+        let pixel = &mut self.pixels[(column / self.factor - self.first) as usize];
+        *pixel = [pixel[0] + weight, pixel[1] + sum];
+    }
+}
+
+impl Pixels {
+    /// Nothing yet, for a tile of this many samples; no side longer than `most` pixels.
+    pub fn new(columns: usize, rows: usize, most: usize) -> Pixels {
+        let factor = columns.max(rows).div_ceil(most).max(1);
+        Pixels::of(factor, [0, 0], columns.div_ceil(factor), rows.div_ceil(factor))
+    }
+
+    fn of(factor: usize, first: [usize; 2], columns: usize, rows: usize) -> Pixels {
+        let zero = vec![0.0; columns * rows];
+        Pixels { factor, columns, rows, first, sums: zero.clone(), weights: zero }
+    }
+
+    /// Nothing yet, for the pixels of this picture that samples of `window` lie in.
+    pub fn part(&self, window: Window) -> Pixels {
+        let range = |start: i64, end: i64| {
+            let first = start as usize / self.factor;
+            (first, (end as usize - 1) / self.factor - first + 1)
+        };
+        let (column, columns) = range(window.column, window.column_end());
+        let (row, rows) = range(window.row, window.row_end());
+        Pixels::of(self.factor, [column, row], columns, rows)
+    }
+
+    /// Nothing yet, for the samples of a row.
+    pub(super) fn line(&self, window: Window) -> Line {
+        let factor = self.factor as i64;
+        let first = window.column / factor;
+        let count = (window.column_end() - 1) / factor - first + 1;
+        Line { factor, first, pixels: vec![[0.0; 2]; count as usize] }
+    }
+
+    /// Adds a row of samples.
+    pub(super) fn add(&mut self, row: i64, line: &Line) {
+        let start =
+            (row as usize / self.factor - self.first[1]) * self.columns + line.first as usize - self.first[0];
+        for (offset, [weight, sum]) in line.pixels.iter().enumerate() {
+            self.weights[start + offset] += weight;
+            self.sums[start + offset] += sum;
+        }
+    }
+
+    /// Adds what another part of the same picture holds; the caller keeps an order.
+    pub fn merge(&mut self, other: &Pixels) {
+        for row in 0..other.rows {
+            let start =
+                (row + other.first[1] - self.first[1]) * self.columns + other.first[0] - self.first[0];
+            for column in 0..other.columns {
+                let from = row * other.columns + column;
+                self.sums[start + column] += other.sums[from];
+                self.weights[start + column] += other.weights[from];
+            }
+        }
+    }
+
+    /// Sum of all values times their weights, and of all weights.
+    pub fn total(&self) -> [f64; 2] {
+        [self.sums.iter().sum(), self.weights.iter().sum()]
+    }
+
+    /// The mean of every pixel by row, lowest y first; NaN where there is nothing.
+    pub fn means(&self) -> Vec<f64> {
+        self.sums.iter().zip(&self.weights).map(|(sum, weight)| sum / weight).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_a_picture_make_the_picture() {
+        let whole = Window { column: 0, row: 0, columns: 103, rows: 57 };
+        let value = |column: i64, row: i64| (column * 7 + row * 13) as f64;
+        let fill = |pixels: &mut Pixels, window: Window| {
+            for row in window.row..window.row_end() {
+                let mut line = pixels.line(window);
+                (window.column..window.column_end()).for_each(|c| line.add(c, [1.0, value(c, row)]));
+                pixels.add(row, &line);
+            }
+        };
+        let mut at_once = Pixels::new(103, 57, 30);
+        assert_eq!((at_once.factor, at_once.columns, at_once.rows), (4, 26, 15));
+        fill(&mut at_once, whole);
+        let mut pieced = Pixels::new(103, 57, 30);
+        for (column, columns) in [(0, 50), (50, 53)] {
+            for (row, rows) in [(0, 21), (21, 36)] {
+                let window = Window { column, row, columns, rows };
+                let mut part = pieced.part(window);
+                fill(&mut part, window);
+                pieced.merge(&part);
+            }
+        }
+        assert_eq!(at_once, pieced);
+        assert_eq!(at_once.means()[0], (0..16).map(|k| value(k % 4, k / 4)).sum::<f64>() / 16.0);
+        assert_eq!(at_once.total()[1], 103.0 * 57.0);
+    }
+}
