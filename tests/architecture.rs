@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom; a room imports from rooms above it only.
-const ORDER: [&str; 20] = [
+const ORDER: [&str; 21] = [
     "settings",
     "catalogue",
     "progress",
