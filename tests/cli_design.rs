@@ -79,6 +79,19 @@ fn the_thread_count_does_not_change_a_byte() {
 }
 
 #[test]
+fn stages_are_timed_on_request() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("a.npz");
+    let arguments = ["--out", out.to_str().expect("text"), "--cells", "0", "0", "2", "1", "--quiet", "-v"];
+    let mut all = vec![sample("conference")];
+    all.extend(arguments.map(String::from));
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
+    let stages = ["elevation", "sampling", "solving", "writing"];
+    let lines = stages.map(|stage| format!("{stage}: [0-9.]+ s\n")).concat();
+    design(&all).success().stderr(predicate::str::is_match(format!("^{lines}$")).expect("a pattern"));
+}
+
+#[test]
 fn a_given_elevation_is_taken_as_it_is() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("a.npz");

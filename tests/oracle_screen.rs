@@ -1,5 +1,8 @@
 //! The design against an independent implementation of the paper (tests/cases).
 
+#[path = "screen/plain.rs"]
+mod plain;
+
 use glam::DVec3;
 use screenmill::screen::{self, Scene, Workspace};
 use serde_json::Value;
@@ -80,5 +83,30 @@ fn edge_cases_merge_and_solve_as_the_references() {
         assert_eq!(solved.merged_into, map, "{tag}");
         assert!(largest_difference(&solved.offsets_mm, &numbers(&case["c"])) < 1e-6, "{tag}");
         assert!(largest_difference(&solved.achieved_mm2, &numbers(&case["A"])) < 1e-7, "{tag}");
+    }
+}
+
+#[test]
+fn the_quick_solver_finds_what_the_plain_one_does() {
+    for (name, facets, place) in
+        [("theatre", 200, [0.93, -0.41]), ("home-theatre", 120, [-0.5, 0.3]), ("conference", 37, [0.0, 0.49])]
+    {
+        let scene = scene(name);
+        let x = DVec3::new(place[0], place[1], 0.03);
+        let found = screen::directions(&scene.view(x), facets).expect("an audience");
+        let wanted = screen::facets(&scene, x, &found.list).expect("facets");
+        let solved = screen::solve(&mut Workspace::default(), &wanted.gradients, &wanted.weights, 4.0, 1e-6)
+            .expect("a solution");
+        let (plain, _) = plain::solve(&solved.gradients, &solved.areas_mm2, 4.0);
+        // Offsets are free by a constant.
+        let shift = solved.offsets_mm[0] - plain[0];
+        for (c, d) in solved.offsets_mm.iter().zip(&plain) {
+            assert!((c - d - shift).abs() < 1e-7, "{name}: {c} {}", d + shift);
+        }
+        let areas: Vec<f64> = plain::diagram(&solved.gradients, &solved.offsets_mm, 2.0)
+            .iter()
+            .map(|polygon| plain::area(polygon))
+            .collect();
+        assert!(largest_difference(&areas, &solved.achieved_mm2) < 1e-13, "{name}");
     }
 }

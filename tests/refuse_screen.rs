@@ -147,6 +147,10 @@ fn designs_that_cannot_be_made_are_refused() {
     refuse("cells-none", &scene, range(3, 0, 3, 1), None);
     let many = Scene::parse(&changed("facets = 200", "facets = 4000"), "screen.toml").expect("a scene");
     refuse("too-much-at-once", &many, None, None);
+    let imax = changed("width_m = 2.0", "width_m = 22.0").replace("height_m = 1.0", "height_m = 16.1");
+    let imax = Scene::parse(&imax, "screen.toml").expect("a scene");
+    let error = screen::frame(&imax, None).expect_err("too large");
+    check("too-much-for-a-file", "a design of 22 x 16.1 m, see tests/refuse_screen.rs", &error.to_string());
     let far = slab([40.0, 41.0], [0.0, 0.1], [0.01, 0.02]);
     let low = with_audience(&format!("[[audience]]\nname = \"low\"\n{far}"));
     let low = Scene::parse(&low, "screen.toml").expect("a scene");

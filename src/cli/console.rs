@@ -32,6 +32,11 @@ pub fn listen_for_interrupt() -> Result<(), ctrlc::Error> {
     })
 }
 
+/// Whether the work should end at the next safe place.
+pub fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::SeqCst)
+}
+
 /// Has a folder removed if the program is interrupted, until [`finished`].
 pub fn unfinished(folder: &Path) {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).push(folder.to_path_buf());
@@ -131,6 +136,6 @@ impl Progress for Console {
     }
 
     fn interrupted(&self) -> bool {
-        INTERRUPTED.load(Ordering::SeqCst)
+        interrupted()
     }
 }

@@ -1,14 +1,18 @@
 //! `screenmill design`: from a scene to designed cells.
 
-use std::cell::Cell;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use screenmill::screen::{self, CellRange, Design, Elevation, Profile, Scene, Seam, SolidError};
+use screenmill::progress::Progress;
+use screenmill::screen::{
+    self, CellRange, Design, DesignWriter, Elevation, Frame, Profile, Scene, Seam, SolidError,
+};
 use serde_json::json;
 
-use super::{Common, Outcome, Refusal};
+use super::{Common, Outcome, Refusal, console};
 
 /// Design the cells of a screen: facets, microgeometry, elevation
 #[derive(clap::Args)]
@@ -51,13 +55,64 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     }
     let cells = arguments.cells.as_ref().map(|c| CellRange { c0: c[0], r0: c[1], c1: c[2], r1: c[3] });
     let elevation = arguments.elevation.as_deref().map(Elevation::read).transpose()?;
-    let design = screen::design(&scene, cells, elevation.as_ref(), &progress(common.quiet))?;
-    design.write(&arguments.out)?;
+    let frame = screen::frame(&scene, cells)?;
+    let mut made = Made::new(frame);
+    let watch = Watch::new(common.quiet, frame.extent.columns() * frame.extent.rows());
+    let mut writer = DesignWriter::create(&arguments.out, &frame)?;
+    screen::design_streamed::<Refusal>(&scene, &frame, elevation.as_ref(), &watch, &mut |cell| {
+        made.count(&cell);
+        Ok(writer.push(&cell)?)
+    })?;
+    watch.begin("writing", 0);
+    writer.finish()?;
     if let Some(stl) = &arguments.stl {
-        design.write_stl(stl)?;
+        watch.begin("solids", 0);
+        Design::read(&arguments.out)?.write_stl(stl)?;
     }
-    summarise(&scene, &design, arguments, common.json);
+    let times = watch.times();
+    if common.verbose {
+        for (stage, time) in times {
+            eprintln!("{stage}: {:.2} s", time.as_secs_f64());
+        }
+    }
+    summarise(&scene, &made, arguments, common.json);
     Ok(Outcome::Within)
+}
+
+/// What is said of a design, gathered while its cells go by.
+struct Made {
+    frame: Frame,
+    cells: usize,
+    cells_with_ring: usize,
+    facets: usize,
+    facets_per_cell: [usize; 2],
+    elevation_mm: [f64; 2],
+}
+
+impl Made {
+    fn new(frame: Frame) -> Made {
+        Made {
+            frame,
+            cells: 0,
+            cells_with_ring: 0,
+            facets: 0,
+            facets_per_cell: [usize::MAX, 0],
+            elevation_mm: [f64::INFINITY, f64::NEG_INFINITY],
+        }
+    }
+
+    fn count(&mut self, cell: &screen::Cell) {
+        self.cells_with_ring += 1;
+        if !self.frame.core.contains(cell.column, cell.row) {
+            return;
+        }
+        let facets = cell.facets.len();
+        self.cells += 1;
+        self.facets += facets;
+        self.facets_per_cell = [self.facets_per_cell[0].min(facets), self.facets_per_cell[1].max(facets)];
+        self.elevation_mm =
+            [self.elevation_mm[0].min(cell.elevation_mm), self.elevation_mm[1].max(cell.elevation_mm)];
+    }
 }
 
 fn writable(path: &Path) -> Result<(), Unwritable> {
@@ -69,50 +124,99 @@ fn writable(path: &Path) -> Result<(), Unwritable> {
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|source| Unwritable::Parent { path: name, source })
 }
 
-/// A bar on a terminal, a line at every tenth elsewhere.
-fn progress(quiet: bool) -> impl Fn(usize, usize) {
-    let terminal = std::io::stderr().is_terminal();
-    let bar = if quiet || !terminal { ProgressBar::hidden() } else { ProgressBar::no_length() };
-    if let Ok(style) = ProgressStyle::with_template("cells {bar:40} {pos}/{len} {eta}") {
-        bar.set_style(style);
-    }
-    let said = Cell::new(0);
-    move |done, total| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        let tenth = 10 * done / total.max(1);
-        if !quiet && !terminal && tenth > said.replace(tenth) {
-            eprintln!("cells {done} of {total}");
+/// Cells that are done, on a bar on a terminal or a line at every tenth elsewhere, and how long each
+/// stage took: sampling and solving take turns, so each is the sum of its turns.
+struct Watch {
+    bar: ProgressBar,
+    said: bool,
+    state: Mutex<Stages>,
+    total: usize,
+}
+
+struct Stages {
+    running: Option<(String, Instant)>,
+    done: Vec<(String, Duration)>,
+    cells: usize,
+}
+
+/// The stage whose steps are finished cells.
+const LAST_STAGE: &str = "solving";
+
+impl Watch {
+    fn new(quiet: bool, total: usize) -> Watch {
+        let terminal = std::io::stderr().is_terminal();
+        let bar = if quiet || !terminal { ProgressBar::hidden() } else { ProgressBar::new(total as u64) };
+        if let Ok(style) = ProgressStyle::with_template("cells {bar:40} {pos}/{len} {eta}") {
+            bar.set_style(style);
         }
-        if done == total {
-            bar.finish_and_clear();
+        let state = Mutex::new(Stages { running: None, done: Vec::new(), cells: 0 });
+        Watch { bar, said: !quiet && !terminal, state, total }
+    }
+
+    /// Ends the running stage; the stages in their order, each with its time.
+    fn times(&self) -> Vec<(String, Duration)> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.end();
+        std::mem::take(&mut state.done)
+    }
+}
+
+impl Stages {
+    fn end(&mut self) {
+        let Some((name, since)) = self.running.take() else { return };
+        let time = since.elapsed();
+        match self.done.iter_mut().find(|(known, _)| *known == name) {
+            Some(stage) => stage.1 += time,
+            None => self.done.push((name, time)),
         }
     }
 }
 
-fn summarise(scene: &Scene, design: &Design, arguments: &Arguments, json: bool) {
-    let cells = design.core_cells().count();
-    let counts = design.core_cells().map(|cell| cell.facets.len());
-    let (fewest, most) = (counts.clone().min().unwrap_or(0), counts.clone().max().unwrap_or(0));
-    let facets: usize = counts.sum();
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for cell in design.core_cells() {
-        low = low.min(cell.elevation_mm);
-        high = high.max(cell.elevation_mm);
+impl Progress for Watch {
+    fn begin(&self, stage: &str, _total: u64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.end();
+        state.running = Some((stage.to_string(), Instant::now()));
     }
-    let CellRange { c0, r0, c1, r1 } = design.core;
-    let [width_mm, height_mm] = design.size_mm();
-    let profile = if design.profile == Profile::Bump { "bump" } else { "dish" };
-    let seam = if design.seam == Seam::Step { "step" } else { "stitched" };
+
+    fn advance(&self, steps: u64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        if state.running.as_ref().is_none_or(|(name, _)| name != LAST_STAGE) {
+            return;
+        }
+        let before = state.cells;
+        state.cells += steps as usize;
+        self.bar.set_position(state.cells as u64);
+        let total = self.total.max(1);
+        if self.said && 10 * state.cells / total > 10 * before / total {
+            eprintln!("cells {} of {total}", state.cells);
+        }
+        if state.cells >= total {
+            self.bar.finish_and_clear();
+        }
+    }
+
+    fn interrupted(&self) -> bool {
+        console::interrupted()
+    }
+}
+
+fn summarise(scene: &Scene, made: &Made, arguments: &Arguments, json: bool) {
+    let Made { frame, cells, facets, facets_per_cell: [fewest, most], elevation_mm: [low, high], .. } = *made;
+    let CellRange { c0, r0, c1, r1 } = frame.core;
+    let cell_mm = frame.cell_mm;
+    let [width_mm, height_mm] = [frame.core.columns(), frame.core.rows()].map(|count| count as f64 * cell_mm);
+    let profile = if frame.profile == Profile::Bump { "bump" } else { "dish" };
+    let seam = if frame.seam == Seam::Step { "step" } else { "stitched" };
     let out = arguments.out.display().to_string();
     let stl = arguments.stl.as_ref().map(|path| path.display().to_string());
-    let of_cells = |length_m: f64, count: usize| 1e3 * length_m - count as f64 * design.cell_mm;
+    let of_cells = |length_m: f64, count: usize| 1e3 * length_m - count as f64 * cell_mm;
     let bare = [of_cells(scene.width_m, scene.columns()), of_cells(scene.height_m, scene.rows())]
-        .map(|mm| if mm < 1e-5 * design.cell_mm { 0.0 } else { mm });
+        .map(|mm| if mm < 1e-5 * cell_mm { 0.0 } else { mm });
     if json {
         let summary = json!({
             "file": out, "stl": stl, "core": [c0, r0, c1, r1], "cells": cells,
-            "cells_with_ring": design.cells.len(), "cell_mm": design.cell_mm,
+            "cells_with_ring": made.cells_with_ring, "cell_mm": cell_mm,
             "width_mm": width_mm, "height_mm": height_mm, "profile": profile, "seam": seam,
             "facets": facets, "facets_per_cell": [fewest, most],
             "elevation_mm": [low, high], "bare_mm": bare,
@@ -122,7 +226,7 @@ fn summarise(scene: &Scene, design: &Design, arguments: &Arguments, json: bool) 
     }
     println!(
         "{cells} cells of {} mm: columns {c0} to {c1}, rows {r0} to {r1}, {width_mm} x {height_mm} mm",
-        design.cell_mm
+        cell_mm
     );
     let per_cell = if fewest == most { format!("{most}") } else { format!("{fewest} to {most}") };
     println!("{per_cell} facets a cell, {facets} in all; profile {profile}, seam {seam}");

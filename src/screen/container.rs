@@ -2,25 +2,30 @@
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use npyz::{DType, NpyFile, Order, TypeChar, WriterBuilder};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
-use super::{Cell, CellRange, Design, Elevation, Facet, Profile, Seam};
+use super::{Cell, CellRange, Design, Elevation, Facet, Frame, Profile, Seam};
 
 /// Most bytes that one array may hold.
 const MOST_BYTES: u64 = 1 << 34;
+/// What an archive's member may hold without the larger fields of a zip64, with room for a header.
+const MOST_BYTES_OF_A_SMALL_FILE: u64 = (1 << 32) - (1 << 16);
 
 /// An empty file in the folder of `path`, to be renamed to it when whole. Its mode is that of any new
 /// file.
 pub(super) fn beside(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.prefix(".screenmill-").tempfile_in(folder)
+    builder.prefix(".screenmill-").tempfile_in(folder(path))
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Why a container or an elevation file was not read or written.
@@ -68,41 +73,118 @@ pub enum ContainerError {
     },
 }
 
+/// Writes a container cell by cell. What grows with the facets waits in unnamed files beside the
+/// container, since its arrays stand in it one after the other; what is kept in memory is 20 bytes a cell.
+pub struct DesignWriter {
+    frame: Frame,
+    path: PathBuf,
+    cells: Vec<[i32; 2]>,
+    elevation_mm: Vec<f64>,
+    facet_start: Vec<i64>,
+    gradient: Spool,
+    offset: Spool,
+    area: Spool,
+}
+
+/// Numbers that wait on disk.
+struct Spool(BufWriter<File>);
+
+impl Spool {
+    fn beside(path: &Path) -> std::io::Result<Spool> {
+        let file = tempfile::tempfile_in(folder(path))?;
+        Ok(Spool(BufWriter::with_capacity(1 << 18, file)))
+    }
+
+    fn put(&mut self, value: f64) -> std::io::Result<()> {
+        self.0.write_all(&value.to_le_bytes())
+    }
+
+    /// The bytes from the first, ready to be read.
+    fn rewound(self) -> std::io::Result<File> {
+        let mut file = self.0.into_inner().map_err(|e| e.into_error())?;
+        file.rewind()?;
+        Ok(file)
+    }
+}
+
+impl DesignWriter {
+    /// Begins a container. Nothing stands under `path` until [`DesignWriter::finish`].
+    pub fn create(path: &Path, frame: &Frame) -> Result<DesignWriter, ContainerError> {
+        let spool = || {
+            Spool::beside(path)
+                .map_err(|source| ContainerError::Io { path: path.display().to_string(), source })
+        };
+        Ok(DesignWriter {
+            frame: *frame,
+            path: path.to_path_buf(),
+            cells: Vec::new(),
+            elevation_mm: Vec::new(),
+            facet_start: vec![0],
+            gradient: spool()?,
+            offset: spool()?,
+            area: spool()?,
+        })
+    }
+
+    /// Appends the next cell, by row, then column.
+    pub fn push(&mut self, cell: &Cell) -> Result<(), ContainerError> {
+        self.put(cell).map_err(|source| ContainerError::Io { path: self.path.display().to_string(), source })
+    }
+
+    fn put(&mut self, cell: &Cell) -> std::io::Result<()> {
+        for facet in &cell.facets {
+            self.gradient.put(facet.gradient[0])?;
+            self.gradient.put(facet.gradient[1])?;
+            self.offset.put(facet.offset_mm)?;
+            self.area.put(facet.area_mm2)?;
+        }
+        let facets = self.facet_start.last().copied().unwrap_or(0) + cell.facets.len() as i64;
+        self.cells.push([cell.column, cell.row]);
+        self.elevation_mm.push(cell.elevation_mm);
+        self.facet_start.push(facets);
+        Ok(())
+    }
+
+    /// Puts the container under its name.
+    pub fn finish(self) -> Result<(), ContainerError> {
+        let path = self.path.clone();
+        let name = || path.display().to_string();
+        let io = |source| ContainerError::Io { path: name(), source };
+        let file = beside(&path).map_err(io)?;
+        let mut zip = ZipWriter::new(BufWriter::with_capacity(1 << 18, file));
+        self.write_arrays(&mut zip).map_err(io)?;
+        let buffer = zip.finish().map_err(|source| ContainerError::Archive { path: name(), source })?;
+        let file = buffer.into_inner().map_err(|e| io(e.into_error()))?;
+        file.persist(&path).map_err(|e| io(e.error))?;
+        Ok(())
+    }
+
+    fn write_arrays<W: Write + Seek>(self, zip: &mut ZipWriter<W>) -> std::io::Result<()> {
+        let n = self.cells.len() as u64;
+        let m = self.facet_start.last().copied().unwrap_or(0) as u64;
+        let Frame { core: CellRange { c0, r0, c1, r1 }, cell_mm, profile, seam, .. } = self.frame;
+        array(zip, "cell", &[n, 2], self.cells.into_iter().flatten())?;
+        array(zip, "core", &[4], [c0, r0, c1, r1])?;
+        array(zip, "cell_mm", &[], [cell_mm])?;
+        array(zip, "elevation_mm", &[n], self.elevation_mm)?;
+        array(zip, "facet_start", &[n + 1], self.facet_start)?;
+        spooled(zip, "gradient", &[m, 2], self.gradient)?;
+        spooled(zip, "offset_mm", &[m], self.offset)?;
+        spooled(zip, "area_mm2", &[m], self.area)?;
+        array(zip, "profile", &[], [i32::from(profile == Profile::Dish)])?;
+        array(zip, "seam", &[], [i32::from(seam == Seam::Stitched)])
+    }
+}
+
 impl Design {
     /// Writes the container; the same design gives the same bytes. Nothing is left under `path` if
     /// that fails.
     pub fn write(&self, path: &Path) -> Result<(), ContainerError> {
-        let name = path.display().to_string();
-        let io = |source| ContainerError::Io { path: path.display().to_string(), source };
-        let file = beside(path).map_err(io)?;
-        let mut zip = ZipWriter::new(BufWriter::new(file));
-        self.write_arrays(&mut zip).map_err(io)?;
-        let buffer = zip.finish().map_err(|source| ContainerError::Archive { path: name, source })?;
-        let file = buffer.into_inner().map_err(|e| io(e.into_error()))?;
-        file.persist(path).map_err(|e| io(e.error))?;
-        Ok(())
-    }
-
-    fn write_arrays<W: Write + Seek>(&self, zip: &mut ZipWriter<W>) -> std::io::Result<()> {
-        let n = self.cells.len() as u64;
-        let facets = || self.cells.iter().flat_map(|cell| cell.facets.iter());
-        let m = facets().count() as u64;
-        let mut total = 0;
-        let starts = std::iter::once(0).chain(self.cells.iter().map(|cell| {
-            total += cell.facets.len() as i64;
-            total
-        }));
-        let CellRange { c0, r0, c1, r1 } = self.core;
-        array(zip, "cell", &[n, 2], self.cells.iter().flat_map(|cell| [cell.column, cell.row]))?;
-        array(zip, "core", &[4], [c0, r0, c1, r1])?;
-        array(zip, "cell_mm", &[], [self.cell_mm])?;
-        array(zip, "elevation_mm", &[n], self.cells.iter().map(|cell| cell.elevation_mm))?;
-        array(zip, "facet_start", &[n + 1], starts)?;
-        array(zip, "gradient", &[m, 2], facets().flat_map(|facet| facet.gradient))?;
-        array(zip, "offset_mm", &[m], facets().map(|facet| facet.offset_mm))?;
-        array(zip, "area_mm2", &[m], facets().map(|facet| facet.area_mm2))?;
-        array(zip, "profile", &[], [i32::from(self.profile == Profile::Dish)])?;
-        array(zip, "seam", &[], [i32::from(self.seam == Seam::Stitched)])
+        let mut writer = DesignWriter::create(path, &self.frame())?;
+        for cell in &self.cells {
+            writer.push(cell)?;
+        }
+        writer.finish()
     }
 
     /// Reads a container and checks that its arrays fit together.
@@ -252,14 +334,37 @@ where
     T: npyz::AutoSerialize,
     I: IntoIterator<Item = T>,
 {
-    // Stored, not deflated: facets are noise to a compressor, and numpy maps what is stored.
-    let options = SimpleFileOptions::default()
-        .compression_method(CompressionMethod::Stored)
-        .last_modified_time(DateTime::default());
-    zip.start_file(format!("{name}.npy"), options)?;
+    begin(zip, name, shape)?;
     let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(zip).begin_nd()?;
     writer.extend(values)?;
     writer.finish()
+}
+
+/// An array of float64 whose bytes, little-endian, are there already.
+fn spooled<W: Write + Seek>(
+    zip: &mut ZipWriter<W>,
+    name: &str,
+    shape: &[u64],
+    spool: Spool,
+) -> std::io::Result<()> {
+    begin(zip, name, shape)?;
+    let header =
+        npyz::WriteOptions::<f64>::new().default_dtype().shape(shape).writer(&mut *zip).begin_nd()?;
+    drop(header);
+    let mut bytes = BufReader::with_capacity(1 << 18, spool.rewound()?);
+    std::io::copy(&mut bytes, zip)?;
+    Ok(())
+}
+
+fn begin<W: Write + Seek>(zip: &mut ZipWriter<W>, name: &str, shape: &[u64]) -> std::io::Result<()> {
+    let items = shape.iter().product::<u64>();
+    // Stored, not deflated: facets are noise to a compressor, and numpy maps what is stored.
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .large_file(items >= MOST_BYTES_OF_A_SMALL_FILE / 8)
+        .last_modified_time(DateTime::default());
+    zip.start_file(format!("{name}.npy"), options)?;
+    Ok(())
 }
 
 #[derive(Clone, Copy, PartialEq)]

@@ -22,6 +22,21 @@ impl CellRange {
         (self.r1 - self.r0).max(0) as usize
     }
 
+    /// With so many more cells on every side.
+    pub fn grown(&self, by: i32) -> CellRange {
+        CellRange { c0: self.c0 - by, r0: self.r0 - by, c1: self.c1 + by, r1: self.r1 + by }
+    }
+
+    /// Those that a screen of so many cells has.
+    pub fn within(&self, columns: usize, rows: usize) -> CellRange {
+        CellRange {
+            c0: self.c0.max(0),
+            r0: self.r0.max(0),
+            c1: self.c1.min(columns as i32),
+            r1: self.r1.min(rows as i32),
+        }
+    }
+
     /// Whether the cell is one of these.
     pub fn contains(&self, column: i32, row: i32) -> bool {
         (self.c0..self.c1).contains(&column) && (self.r0..self.r1).contains(&row)
@@ -72,6 +87,18 @@ pub struct Design {
     pub profile: Profile,
     pub seam: Seam,
     pub cells: Vec<Cell>,
+}
+
+/// What a design covers and how its cells are made, without the cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// The cells asked for.
+    pub core: CellRange,
+    /// The cells that are there: the core, and its ring if stitched.
+    pub extent: CellRange,
+    pub cell_mm: f64,
+    pub profile: Profile,
+    pub seam: Seam,
 }
 
 /// The part of a facet's plane that is on the surface: a convex polygon, counter-clockwise.
@@ -143,6 +170,12 @@ impl Cell {
 }
 
 impl Design {
+    /// All but the cells.
+    pub fn frame(&self) -> Frame {
+        let Design { core, cell_mm, profile, seam, .. } = *self;
+        Frame { core, extent: self.extent(), cell_mm, profile, seam }
+    }
+
     /// The columns and rows of cells that are there: the core, and its ring if stitched.
     pub fn extent(&self) -> CellRange {
         match (self.cells.first(), self.cells.last()) {

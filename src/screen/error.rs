@@ -48,6 +48,12 @@ pub enum Error {
     )]
     TooMuchAtOnce { cells: usize, facets: usize, gib: f64, most_gib: f64 },
     #[error(
+        "{cells} cells of {facets} facets make a container of {gib:.1} GiB, at most {most_gib:.1} GiB are written in one; hint: design parts with --cells C0 R0 C1 R1"
+    )]
+    TooMuchForAFile { cells: usize, facets: usize, gib: f64, most_gib: f64 },
+    #[error("interrupted, nothing was written")]
+    Interrupted,
+    #[error(
         "cell ({column}, {row}) at ({x_m:.4}, {y_m:.4}, {z_m:.4}) m sees no audience; hint: the audience must be in front of every point of the screen, more than 0.06 degrees above its plane"
     )]
     SeesNoAudience { column: i32, row: i32, x_m: f64, y_m: f64, z_m: f64 },

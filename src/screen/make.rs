@@ -1,28 +1,71 @@
 use rayon::prelude::*;
 
 use super::elevation::{Elevation, elevation};
+use super::facets::Wanted;
 use super::microgeometry::{Workspace, solve};
-use super::{Cell, CellRange, Design, Error, Facet, Grazing, Profile, Scene, Seam, directions, facets};
+use super::{
+    Cell, CellRange, Design, Error, Facet, Frame, Grazing, Profile, Scene, Seam, directions, facets,
+};
+use crate::progress::{Progress, Silent};
 
 /// Bytes that a facet of a design takes.
 const FACET_BYTES: f64 = size_of::<Facet>() as f64;
-/// Most that is designed at once; a whole screen of 2 x 1 m takes 0.75 GiB.
+/// Most that is held in memory at once; a whole screen of 2 x 1 m takes 0.75 GiB.
 const MOST_GIB: f64 = 4.0;
+/// Largest container that is written: its gradients stay below what a reader takes.
+const MOST_CONTAINER_GIB: f64 = 32.0;
 const GIB: f64 = (1u64 << 30) as f64;
-/// Cells between two reports of progress.
+/// Cells that are sampled, then solved, at a time.
 const BATCH: usize = 512;
 
 /// Designs cells of a screen (paper, sections 3.1 and 3.2): all of them, or a range; with the
 /// scene's elevation, or a given one. A cell's design depends on the scene and its own elevation
 /// only, never on which others are asked for or on threads. A stitched design also gets the ring
 /// of neighbours around the range, where the screen has them. `progress` is told the cells done and
-/// their number.
+/// their number. [`design_streamed`] holds no more than a few rows.
 pub fn design(
     scene: &Scene,
     cells: Option<CellRange>,
     given: Option<&Elevation>,
     progress: &dyn Fn(usize, usize),
 ) -> Result<Design, Error> {
+    let frame = frame(scene, cells)?;
+    let count = frame.extent.columns() * frame.extent.rows();
+    refuse_above(MOST_GIB, scene, count, |cells, facets, gib, most_gib| Error::TooMuchAtOnce {
+        cells,
+        facets,
+        gib,
+        most_gib,
+    })?;
+    let mut done = Vec::with_capacity(count);
+    progress(0, count);
+    run(scene, &frame, given, &Silent, &mut |cell| {
+        done.push(cell);
+        if done.len() % BATCH == 0 || done.len() == count {
+            progress(done.len(), count);
+        }
+        Ok::<(), Error>(())
+    })?;
+    let Frame { core, cell_mm, profile, seam, .. } = frame;
+    Ok(Design { core, cell_mm, profile, seam, cells: done })
+}
+
+/// The same, cell by cell into `take`, by row, then column, each as soon as it is done: for whole
+/// screens, which need not be in memory. `progress` hears of a stage "elevation", then by turns of
+/// "sampling" and "solving" with the cells of each; it may end the work. An error of `take` does too.
+pub fn design_streamed<E: From<Error>>(
+    scene: &Scene,
+    frame: &Frame,
+    given: Option<&Elevation>,
+    progress: &dyn Progress,
+    take: &mut dyn FnMut(Cell) -> Result<(), E>,
+) -> Result<(), E> {
+    run(scene, frame, given, progress, take)
+}
+
+/// What a design of these cells, or of all, will cover. Refuses cells outside the screen, and more
+/// than one container can hold.
+pub fn frame(scene: &Scene, cells: Option<CellRange>) -> Result<Frame, Error> {
     let (columns, rows) = (scene.columns(), scene.rows());
     let core = cells.unwrap_or(CellRange { c0: 0, r0: 0, c1: columns as i32, r1: rows as i32 });
     let CellRange { c0, r0, c1, r1 } = core;
@@ -32,22 +75,35 @@ pub fn design(
     }
     let microgeometry = &scene.microgeometry;
     let ring = i32::from(microgeometry.seam == Seam::Stitched);
-    let all = CellRange {
-        c0: (c0 - ring).max(0),
-        r0: (r0 - ring).max(0),
-        c1: (c1 + ring).min(columns as i32),
-        r1: (r1 + ring).min(rows as i32),
-    };
-    let count = all.columns() * all.rows();
-    let gib = count as f64 * microgeometry.facets as f64 * FACET_BYTES / GIB;
-    if gib > MOST_GIB {
-        return Err(Error::TooMuchAtOnce {
-            cells: count,
-            facets: microgeometry.facets,
-            gib,
-            most_gib: MOST_GIB,
-        });
-    }
+    let extent = core.grown(ring).within(columns, rows);
+    refuse_above(
+        MOST_CONTAINER_GIB,
+        scene,
+        extent.columns() * extent.rows(),
+        |cells, facets, gib, most_gib| Error::TooMuchForAFile { cells, facets, gib, most_gib },
+    )?;
+    let (profile, seam) = (microgeometry.profile, microgeometry.seam);
+    Ok(Frame { core, extent, cell_mm: microgeometry.width_mm, profile, seam })
+}
+
+fn refuse_above(
+    most_gib: f64,
+    scene: &Scene,
+    cells: usize,
+    error: impl Fn(usize, usize, f64, f64) -> Error,
+) -> Result<(), Error> {
+    let facets = scene.microgeometry.facets;
+    let gib = cells as f64 * facets as f64 * FACET_BYTES / GIB;
+    if gib > most_gib { Err(error(cells, facets, gib, most_gib)) } else { Ok(()) }
+}
+
+fn run<E: From<Error>>(
+    scene: &Scene,
+    frame: &Frame,
+    given: Option<&Elevation>,
+    progress: &dyn Progress,
+    take: &mut dyn FnMut(Cell) -> Result<(), E>,
+) -> Result<(), E> {
     let own;
     let elevation = match given {
         Some(given) => {
@@ -55,48 +111,51 @@ pub fn design(
             given
         }
         None => {
+            progress.begin("elevation", 1);
             own = elevation(scene)?;
+            progress.advance(1);
             &own
         }
     };
-    let mut done = Vec::with_capacity(count);
-    while done.len() < count {
-        progress(done.len(), count);
-        let batch = done.len()..(done.len() + BATCH).min(count);
-        // Cells first, errors after: the first in order is the one reported, whatever the threads.
-        let made: Vec<Result<Cell, Error>> = batch
-            .into_par_iter()
-            .map_init(Workspace::default, |workspace, at| {
-                let column = all.c0 + (at % all.columns()) as i32;
-                let row = all.r0 + (at / all.columns()) as i32;
-                cell(scene, workspace, column, row, elevation.at(column as usize, row as usize))
+    let extent = frame.extent;
+    let count = extent.columns() * extent.rows();
+    for start in (0..count).step_by(BATCH) {
+        let batch: Vec<(i32, i32, f64)> = (start..(start + BATCH).min(count))
+            .map(|at| {
+                let column = extent.c0 + (at % extent.columns()) as i32;
+                let row = extent.r0 + (at / extent.columns()) as i32;
+                (column, row, elevation.at(column as usize, row as usize))
             })
             .collect();
+        if progress.interrupted() {
+            return Err(Error::Interrupted.into());
+        }
+        progress.begin("sampling", batch.len() as u64);
+        // Cells first, errors after: the first in order is the one reported, whatever the threads.
+        let sampled: Vec<Result<Wanted, Error>> =
+            batch.par_iter().map(|&(column, row, z_mm)| sampled(scene, column, row, z_mm)).collect();
+        progress.advance(batch.len() as u64);
+        progress.begin("solving", batch.len() as u64);
+        let made: Vec<Result<Cell, Error>> = batch
+            .par_iter()
+            .zip(sampled)
+            .map_init(Workspace::default, |workspace, (&(column, row, z_mm), wanted)| {
+                cell(scene, workspace, column, row, z_mm, &wanted?)
+            })
+            .collect();
+        progress.advance(batch.len() as u64);
         for cell in made {
-            done.push(cell?);
+            take(cell?)?;
         }
     }
-    progress(count, count);
-    Ok(Design {
-        core,
-        cell_mm: microgeometry.width_mm,
-        profile: microgeometry.profile,
-        seam: microgeometry.seam,
-        cells: done,
-    })
+    Ok(())
 }
 
-fn cell(
-    scene: &Scene,
-    workspace: &mut Workspace,
-    column: i32,
-    row: i32,
-    elevation_mm: f64,
-) -> Result<Cell, Error> {
+/// Gradients and areas of the facets that a cell wants.
+fn sampled(scene: &Scene, column: i32, row: i32, elevation_mm: f64) -> Result<Wanted, Error> {
     let x = scene.centre_m(f64::from(column), f64::from(row), 1e-3 * elevation_mm);
     scene.check_point((column, row), x)?;
-    let microgeometry = &scene.microgeometry;
-    let wanted = microgeometry.facets;
+    let wanted = scene.microgeometry.facets;
     let sampled = directions(&scene.view(x), wanted).ok_or(Error::SeesTooLittle {
         column,
         row,
@@ -106,8 +165,23 @@ fn cell(
         facets: wanted,
         most: super::MOST_SAMPLES,
     })?;
-    let wanted = facets(scene, x, &sampled.list)
-        .map_err(|Grazing { mean_gradient: [mx, my] }| Error::Grazing { column, row, mx, my })?;
+    facets(scene, x, &sampled.list).map_err(|Grazing { mean_gradient: [mx, my] }| Error::Grazing {
+        column,
+        row,
+        mx,
+        my,
+    })
+}
+
+fn cell(
+    scene: &Scene,
+    workspace: &mut Workspace,
+    column: i32,
+    row: i32,
+    elevation_mm: f64,
+    wanted: &Wanted,
+) -> Result<Cell, Error> {
+    let microgeometry = &scene.microgeometry;
     let tolerance = microgeometry.area_tolerance;
     let solved = solve(workspace, &wanted.gradients, &wanted.weights, microgeometry.width_mm, tolerance)
         .map_err(|failed| Error::NotConverged {

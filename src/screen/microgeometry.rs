@@ -6,13 +6,8 @@
 //! Kitagawa, Merigot and Thibert, "Convergence of a Newton algorithm for semi-discrete optimal
 //! transport", J. Eur. Math. Soc. 21 (2019), doi:10.4171/jems/889.
 
-use std::sync::Once;
-
-use faer::prelude::Solve;
-use faer::sparse::{SparseColMat, Triplet};
-use faer::{Mat, Par, Side};
-
-use super::power::{Diagram, SIDES, area_and_moments};
+use super::laplacian::Laplacian;
+use super::power::{Diagram, SIDES, area, area_and_moments};
 
 /// Gradients closer than this are one facet.
 pub const SAME_GRADIENT: f64 = 1e-9;
@@ -48,8 +43,12 @@ pub struct NotConverged {
 #[derive(Default)]
 pub struct Workspace {
     diagram: Diagram,
+    laplacian: Laplacian,
     gx: Vec<f64>,
     gy: Vec<f64>,
+    p: Vec<f64>,
+    tried: Vec<f64>,
+    b: Vec<f64>,
 }
 
 /// Finds the offsets for facets of these gradients and areas (up to a common factor) over a
@@ -63,47 +62,54 @@ pub fn solve(
     tolerance: f64,
 ) -> Result<Solution, NotConverged> {
     let mut cell = merge(gradients, weights, width_mm * width_mm);
-    let Workspace { diagram, gx, gy } = workspace;
-    gx.clear();
-    gy.clear();
-    gx.extend(cell.gradients.iter().map(|g| g[0]));
-    gy.extend(cell.gradients.iter().map(|g| g[1]));
+    let Workspace { diagram, laplacian, gx, gy, p, tried, b } = workspace;
+    let order = sweep_order(&cell.gradients);
+    let n = order.len();
+    let arranged = |out: &mut Vec<f64>, of: &dyn Fn(usize) -> f64| {
+        out.clear();
+        out.extend(order.iter().map(|&k| of(k)));
+    };
+    arranged(gx, &|k| cell.gradients[k][0]);
+    arranged(gy, &|k| cell.gradients[k][1]);
+    arranged(p, &|k| cell.areas_mm2[k]);
     diagram.forget();
     let half = 0.5 * width_mm;
-    let p = &cell.areas_mm2;
-    let n = p.len();
-    let areas = |diagram: &mut Diagram, c: &[f64]| -> Vec<f64> {
+    let areas = |diagram: &mut Diagram, c: &[f64], out: &mut Vec<f64>| {
         diagram.compute(gx, gy, c, [-half; 2], [half; 2]);
-        (0..n).map(|i| area_and_moments(diagram.polygon(i)).0).collect()
+        out.clear();
+        out.extend((0..n).map(|i| area(diagram.polygon(i))));
     };
-    let mut c = quadratic_start(&cell.gradients, half);
-    let mut a = areas(diagram, &c);
+    let start = quadratic_start(&cell.gradients, half);
+    let mut c: Vec<f64> = order.iter().map(|&k| start[k]).collect();
+    let mut a = Vec::with_capacity(n);
+    areas(diagram, &c, &mut a);
     let least = |list: &[f64]| list.iter().copied().fold(f64::INFINITY, f64::min);
     let floor = 0.5 * least(p).min(least(&a));
     let (mut error, mut iterations) = (worst(&a, p), 0);
+    let mut r = Vec::with_capacity(n);
     while error > tolerance {
         if iterations == ITERATIONS {
             return Err(NotConverged { error, iterations });
         }
         diagram.remember();
-        let mut r: Vec<f64> = a.iter().zip(p).map(|(a, p)| a - p).collect();
+        r.clear();
+        r.extend(a.iter().zip(&*p).map(|(a, p)| a - p));
         // The sum is zero but for rounding, which the singular Laplacian would blow up.
         let mean = r.iter().sum::<f64>() / n as f64;
         r.iter_mut().for_each(|r| *r -= mean);
-        let size = norm(&r);
-        let step = newton_step(diagram, gx, gy, &r).ok_or(NotConverged { error, iterations })?;
+        let size = norm(r.iter().copied());
+        couple(laplacian, diagram, gx, gy);
+        let step = laplacian.solve(&r).ok_or(NotConverged { error, iterations })?;
         let mut t = 1.0;
         loop {
-            let tried: Vec<f64> = c.iter().zip(&step).map(|(c, d)| c + t * d).collect();
-            let b = areas(diagram, &tried);
-            let left: Vec<f64> = b.iter().zip(p).map(|(b, p)| b - p).collect();
-            if least(&b) >= floor && norm(&left) <= (1.0 - 0.5 * t) * size {
-                (c, a) = (tried, b);
-                break;
-            }
+            tried.clear();
+            tried.extend(c.iter().zip(&step).map(|(c, d)| c + t * d));
+            areas(diagram, tried, b);
+            let left = norm(b.iter().zip(&*p).map(|(b, p)| b - p));
             // Where rounding is all that is left, the last step may have done what can be done.
-            if worst(&b, p) <= tolerance {
-                (c, a) = (tried, b);
+            if (least(b) >= floor && left <= (1.0 - 0.5 * t) * size) || worst(b, p) <= tolerance {
+                std::mem::swap(&mut c, tried);
+                std::mem::swap(&mut a, b);
                 break;
             }
             t *= 0.5;
@@ -120,18 +126,35 @@ pub fn solve(
         volume += gx[i] * mx + gy[i] * my + c[i] * area;
     }
     let mean = volume / (width_mm * width_mm);
-    cell.offsets_mm = c.iter().map(|c| c - mean).collect();
-    cell.achieved_mm2 = a;
+    cell.offsets_mm = vec![0.0; n];
+    cell.achieved_mm2 = vec![0.0; n];
+    for (at, &k) in order.iter().enumerate() {
+        cell.offsets_mm[k] = c[at] - mean;
+        cell.achieved_mm2[k] = a[at];
+    }
     cell.iterations = iterations;
     Ok(cell)
+}
+
+/// Facets along the axis in which their gradients spread further: neighbours stand near each other
+/// in this order, which the linear system and the search for neighbours live by.
+fn sweep_order(gradients: &[[f64; 2]]) -> Vec<usize> {
+    let extent = |axis: usize| {
+        let values = gradients.iter().map(|g| g[axis]);
+        values.clone().fold(f64::NEG_INFINITY, f64::max) - values.fold(f64::INFINITY, f64::min)
+    };
+    let axis = usize::from(extent(1) > extent(0));
+    let mut order: Vec<usize> = (0..gradients.len()).collect();
+    order.sort_unstable_by(|&a, &b| gradients[a][axis].total_cmp(&gradients[b][axis]).then(a.cmp(&b)));
+    order
 }
 
 fn worst(areas: &[f64], wanted: &[f64]) -> f64 {
     areas.iter().zip(wanted).map(|(a, p)| (a - p).abs() / p).fold(0.0, f64::max)
 }
 
-fn norm(list: &[f64]) -> f64 {
-    list.iter().map(|v| v * v).sum::<f64>().sqrt()
+fn norm(list: impl Iterator<Item = f64>) -> f64 {
+    list.map(|v| v * v).sum::<f64>().sqrt()
 }
 
 fn merge(gradients: &[[f64; 2]], weights: &[f64], area_mm2: f64) -> Solution {
@@ -190,20 +213,11 @@ fn quadratic_start(gradients: &[[f64; 2]], half_mm: f64) -> Vec<f64> {
     gradients.iter().map(bowl).collect()
 }
 
-/// Solves L d = r for the graph Laplacian L of the diagram, W_ij = length of the edge between i
-/// and j over |g_i - g_j|: the areas' derivative is -L. One unknown is pinned, since only
-/// differences count. None if L is singular beyond that.
-fn newton_step(diagram: &Diagram, gx: &[f64], gy: &[f64], r: &[f64]) -> Option<Vec<f64>> {
-    // Cells are what runs in parallel; a factorisation split over threads would round by their number.
-    static ONE_THREAD: Once = Once::new();
-    ONE_THREAD.call_once(|| faer::set_global_parallelism(Par::Seq));
-    let n = r.len();
-    if n < 2 {
-        return Some(vec![0.0; n]);
-    }
-    let mut diagonal = vec![0.0; n];
-    let mut entries: Vec<Triplet<u32, u32, f64>> = Vec::with_capacity(5 * n);
-    for i in 0..n {
+/// The graph Laplacian L of the diagram, W_ij = length of the edge between i and j over
+/// |g_i - g_j|: the areas' derivative is -L.
+fn couple(laplacian: &mut Laplacian, diagram: &Diagram, gx: &[f64], gy: &[f64]) {
+    laplacian.clear(gx.len());
+    for i in 0..gx.len() {
         let polygon = diagram.polygon(i);
         for (at, &(from, label)) in polygon.iter().enumerate() {
             // Each edge once, from its lower side, so that L is symmetric to the bit.
@@ -211,22 +225,10 @@ fn newton_step(diagram: &Diagram, gx: &[f64], gy: &[f64], r: &[f64]) -> Option<V
                 continue;
             }
             let j = label as usize;
-            let to = polygon[(at + 1) % polygon.len()].0;
-            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-            let weight = length / (gx[i] - gx[j]).hypot(gy[i] - gy[j]);
-            diagonal[i] += weight;
-            diagonal[j] += weight;
-            if j < n - 1 {
-                entries.push(Triplet::new(label, i as u32, -weight));
-            }
+            let to = polygon[if at + 1 < polygon.len() { at + 1 } else { 0 }].0;
+            let (ex, ey) = (to[0] - from[0], to[1] - from[1]);
+            let (dx, dy) = (gx[i] - gx[j], gy[i] - gy[j]);
+            laplacian.couple(i, j, ((ex * ex + ey * ey) / (dx * dx + dy * dy)).sqrt());
         }
     }
-    entries.extend((0..n - 1).map(|i| Triplet::new(i as u32, i as u32, diagonal[i])));
-    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(n - 1, n - 1, &entries).ok()?;
-    let factors = matrix.sp_cholesky(Side::Lower).ok()?;
-    let right = Mat::from_fn(n - 1, 1, |i, _| r[i]);
-    let solved = factors.solve(&right);
-    let mut step: Vec<f64> = (0..n - 1).map(|i| solved[(i, 0)]).collect();
-    step.push(0.0);
-    step.iter().all(|d| d.is_finite()).then_some(step)
 }
