@@ -5,12 +5,11 @@ use std::path::{Path, PathBuf};
 use screenmill::job::Job;
 use screenmill::machine::Machine;
 use screenmill::pipeline;
-use screenmill::post::Dialect;
 use screenmill::verify::{Clock, Event, Extent, Kinematics, Language, Options, Summary, Timing};
 use serde_json::{Map, Value, json};
 
 use super::console::Console;
-use super::program::{Refused, bounds, clock, language, stream};
+use super::program::{Refused, bounds, clock, language, reading_options, stream};
 use super::{Common, Outcome, Refusal};
 
 /// Milling time of a job or of programs, with what limits it
@@ -60,7 +59,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let name = arguments.machine.as_deref().ok_or(Misused::NoMachine)?;
     let machine = Machine::find(name, None)?;
     let kinematics = Kinematics::from(&machine);
-    let options = options(&machine)?;
+    let options = reading_options(&machine)?;
     let mut total_s = 0.0;
     let mut limits: Vec<(&'static str, f64)> = Vec::new();
     let mut programs = Vec::new();
@@ -156,17 +155,6 @@ fn estimate(path: &Path, options: &Options, kinematics: &Kinematics) -> Result<E
     })?;
     let timing = timer.finish(summary.bytes);
     Ok(Estimated { summary, extent, timing })
-}
-
-/// The unit of RML-1 on this machine, which the text does not say.
-fn options(machine: &Machine) -> Result<Options, Refusal> {
-    for name in &machine.dialects {
-        let dialect = Dialect::find(name, None)?;
-        if dialect.extension == "rml" {
-            return Ok(Options { rml_unit_mm: dialect.unit_mm });
-        }
-    }
-    Ok(Options::default())
 }
 
 /// RML-1 has no rapids, so its travel speed has to be found before the text is timed.

@@ -5,8 +5,12 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 
+use screenmill::machine::Machine;
+use screenmill::post::Dialect;
 use screenmill::verify::{self, Event, Extent, Language, Options, Reading, Summary};
 use serde_json::{Value, json};
+
+use super::Refusal;
 
 /// Bytes read ahead: long enough for a header, so that the language is found.
 const BUFFER: usize = 1 << 16;
@@ -28,6 +32,17 @@ fn open(path: &Path) -> Result<BufReader<File>, Refused> {
     Ok(BufReader::with_capacity(BUFFER, file))
 }
 
+/// The unit of RML-1 on this machine, which the text does not say.
+pub fn reading_options(machine: &Machine) -> Result<Options, Refusal> {
+    for name in &machine.dialects {
+        let dialect = Dialect::find(name, None)?;
+        if dialect.extension == "rml" {
+            return Ok(Options { rml_unit_mm: dialect.unit_mm });
+        }
+    }
+    Ok(Options::default())
+}
+
 /// The language of a program, from its beginning.
 pub fn language(path: &Path) -> Result<Language, Refused> {
     let refused = |source| Refused::Open { path: path.into(), source };
@@ -35,9 +50,8 @@ pub fn language(path: &Path) -> Result<Language, Refused> {
 }
 
 /// Reads a program whole.
-pub fn read(path: &Path) -> Result<Reading, Refused> {
-    Reading::from(&mut open(path)?, &Options::default())
-        .map_err(|source| Refused::Text { path: path.into(), source })
+pub fn read(path: &Path, options: &Options) -> Result<Reading, Refused> {
+    Reading::from(&mut open(path)?, options).map_err(|source| Refused::Text { path: path.into(), source })
 }
 
 /// Reads a program event by event; a text without a motion is refused. The text is taken apart on a

@@ -4,11 +4,10 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use screenmill::machine::Machine;
-use screenmill::post::{self, Dialect, LengthUnit};
 use screenmill::resume;
-use screenmill::verify::Options;
 use serde_json::json;
 
+use super::program::reading_options;
 use super::{Common, Outcome, Refusal};
 
 /// Writes a program that starts again at pass N of another, with its modal state
@@ -51,7 +50,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     }
     let machine = arguments.machine.as_deref().map(|name| Machine::find(name, None)).transpose()?;
     let text = std::fs::read(path).map_err(|source| Refused::File { path: path.clone(), source })?;
-    let resumed = resume::resume(&text, arguments.at, &options(machine.as_ref())?)
+    let read_as = machine.as_ref().map(reading_options).transpose()?.unwrap_or_default();
+    let resumed = resume::resume(&text, arguments.at, &read_as)
         .map_err(|source| Refused::Text { path: path.clone(), source })?;
     let Some(out) = &arguments.out else {
         std::io::stdout().write_all(&resumed.text)?;
@@ -83,17 +83,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         );
     }
     Ok(Outcome::Within)
-}
-
-/// What a machine's profile says about the texts it reads: how long a unit of its RML-1 is.
-fn options(machine: Option<&Machine>) -> Result<Options, post::Error> {
-    for name in machine.iter().flat_map(|machine| &machine.dialects) {
-        let dialect = Dialect::find(name, None)?;
-        if dialect.word.x.unit == LengthUnit::Grid {
-            return Ok(Options { rml_unit_mm: dialect.unit_mm });
-        }
-    }
-    Ok(Options::default())
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {

@@ -15,7 +15,7 @@ use screenmill::verify::{
 use serde_json::{Value, json};
 
 use super::console::Console;
-use super::program::{bounds, clock, read};
+use super::program::{bounds, clock, read, reading_options};
 use super::{Common, Outcome, Refusal};
 
 /// A gouge past this fails.
@@ -142,10 +142,11 @@ fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal>
             return Err(Refused::Far { what, value }.into());
         }
     }
+    let read_as = machine.as_ref().map(reading_options).transpose()?.unwrap_or_default();
     console.begin("read programs", programs.len() as u64);
     let mut readings = Vec::new();
     for path in programs {
-        readings.push(read(path)?);
+        readings.push(read(path, &read_as)?);
         console.advance(1);
     }
     let blank = Blank {
