@@ -140,7 +140,7 @@ fn neither_threads_nor_a_second_run_change_a_byte() {
     let one = run("mill job.toml --out out --quiet --threads 1", "out");
     let two = run("mill job.toml --out out --quiet --threads 2", "out");
     let elsewhere = run("mill job.toml --out other --quiet", "other");
-    assert!(one.len() == 16 && one == two);
+    assert!(one.len() == 18 && one == two);
     assert!(one == elsewhere);
 }
 

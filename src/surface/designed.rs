@@ -127,12 +127,17 @@ impl Designed {
 
     /// The part that is both material and lattice, from the core's lower left corner.
     pub(super) fn region(&self) -> Option<Rect> {
-        let CellRange { c0, r0, c1, r1 } = self.material;
         let frame = Rect {
             low: self.origin_mm,
             high: [self.origin_mm[0] + self.lattice.width_mm, self.origin_mm[1] + self.lattice.height_mm],
         };
-        frame.intersection(&Rect { low: self.corner(c0, r0), high: self.corner(c1, r1) })
+        frame.intersection(&self.sheet())
+    }
+
+    /// All that is material, a tile's neighbours in one sheet too, from the core's lower left corner.
+    fn sheet(&self) -> Rect {
+        let CellRange { c0, r0, c1, r1 } = self.material;
+        Rect { low: self.corner(c0, r0), high: self.corner(c1, r1) }
     }
 
     fn corner(&self, column: i32, row: i32) -> [f64; 2] {
@@ -465,6 +470,7 @@ impl Surface for Designed {
 
     fn outlines(&self, low_mm: [f64; 2], high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
         let half_mm = 0.5 * self.design.cell_mm;
+        let sheet = self.sheet();
         let mut outlines = Vec::new();
         for row in self.material.r0..self.material.r1 {
             for column in self.material.c0..self.material.c1 {
@@ -474,7 +480,8 @@ impl Surface for Designed {
                     middle_mm + half_mm >= low_mm[axis] && middle_mm - half_mm <= high_mm[axis]
                 });
                 if reaches {
-                    outlines.extend(self.faces(column, row).into_iter().map(|face| face.outline_mm));
+                    let faces = self.faces_within(column, row, &sheet);
+                    outlines.extend(faces.into_iter().map(|face| face.outline_mm));
                 }
             }
         }

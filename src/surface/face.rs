@@ -21,11 +21,16 @@ impl Designed {
     /// cover it once: with vertical steps each facet is a convex polygon; a stitched facet, which
     /// ends where a neighbour's function takes over, may be several.
     pub fn faces(&self, column: i32, row: i32) -> Vec<Face> {
+        self.region().map_or_else(Vec::new, |region| self.faces_within(column, row, &region))
+    }
+
+    /// The same in any rectangle, from the core's lower left corner.
+    pub(super) fn faces_within(&self, column: i32, row: i32, region: &Rect) -> Vec<Face> {
         let mut faces = Vec::new();
-        let (Some(cell), Some(region)) = (self.cell(column, row), self.region()) else { return faces };
+        let Some(cell) = self.cell(column, row) else { return faces };
         let centre = self.centre(column, row);
         let square = Rect::square(0.5 * self.design.cell_mm).moved(centre);
-        let Some(seen) = square.intersection(&region) else { return faces };
+        let Some(seen) = square.intersection(region) else { return faces };
         let mut shapes = vec![(cell, centre)];
         if self.design.seam == Seam::Stitched {
             for (dr, dc) in [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)] {

@@ -171,6 +171,37 @@ impl<S: Surface> Surface for Tile<S> {
         Ok(heights)
     }
 
+    /// Of a separate blank only what lies on the tile: past its edge there is nothing to protect.
+    fn outlines(&self, low_mm: [f64; 2], high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
+        let step_mm = self.lattice.step_mm;
+        let at = [self.window.column, self.window.row].map(|sample| sample as f64 * step_mm);
+        let size = [self.lattice.width_mm, self.lattice.height_mm];
+        let (mut low, mut high) = (low_mm, high_mm);
+        if !self.neighbours {
+            low = std::array::from_fn(|axis| low[axis].max(0.0));
+            high = std::array::from_fn(|axis| high[axis].min(size[axis]));
+            if (0..2).any(|axis| low[axis] > high[axis]) {
+                return Vec::new();
+            }
+        }
+        let shifted = |place: [f64; 2]| std::array::from_fn(|axis| place[axis] + at[axis]);
+        let mut outlines = self.inner.outlines(shifted(low), shifted(high));
+        for corner in outlines.iter_mut().flatten() {
+            corner[0] -= at[0];
+            corner[1] -= at[1];
+        }
+        if !self.neighbours {
+            for outline in &mut outlines {
+                for axis in 0..2 {
+                    *outline = cut(outline, |corner| corner[axis]);
+                    *outline = cut(outline, |corner| size[axis] - corner[axis]);
+                }
+            }
+            outlines.retain(|outline| !outline.is_empty());
+        }
+        outlines
+    }
+
     fn range_mm(&self, window: Window) -> Result<Option<[f64; 2]>, Error> {
         let wanted = Window {
             column: window.column + self.window.column,
@@ -183,6 +214,23 @@ impl<S: Surface> Surface for Tile<S> {
             None => Ok(None),
         }
     }
+}
+
+/// The part of a convex polygon in space where a linear function is not negative.
+fn cut(outline: &[[f64; 3]], inside: impl Fn(&[f64; 3]) -> f64) -> Vec<[f64; 3]> {
+    let mut kept = Vec::with_capacity(outline.len() + 1);
+    for (index, from) in outline.iter().enumerate() {
+        let to = &outline[(index + 1) % outline.len()];
+        let (a, b) = (inside(from), inside(to));
+        if a >= 0.0 {
+            kept.push(*from);
+        }
+        if (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0) {
+            let t = a / (a - b);
+            kept.push(std::array::from_fn(|axis| from[axis] + t * (to[axis] - from[axis])));
+        }
+    }
+    kept
 }
 
 /// Columns and rows exchanged, z(y, x): passes along Y become passes along X.
@@ -241,5 +289,18 @@ impl<S: Surface> Surface for Transposed<S> {
 
     fn levelled(&self) -> Result<Level, Error> {
         Err(Error::NotLevelled)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::cut;
+
+    #[test]
+    fn a_square_across_the_edge_keeps_its_slope_up_to_it() {
+        let square = [[-1.0, 0.0, 0.0], [1.0, 0.0, 2.0], [1.0, 1.0, 2.0], [-1.0, 1.0, 0.0]];
+        let want = [[0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [1.0, 1.0, 2.0], [0.0, 1.0, 1.0]];
+        assert_eq!(cut(&square, |corner| corner[0]), want);
+        assert!(cut(&square, |corner| corner[0] - 2.0).is_empty());
     }
 }
