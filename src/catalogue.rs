@@ -175,7 +175,8 @@ mod tests {
         );
         assert_eq!(
             message(Kind::Dialect, "zz"),
-            "post \"zz\" is not known; hint: known: \"grbl\", \"linuxcnc\", \"rml1\", or give a file as ./zz.toml"
+            "post \"zz\" is not known; hint: known: \"fanuc\", \"fluidnc\", \"grbl\", \"grblhal\", \"haas\", \"linuxcnc\", \
+             \"mach3\", \"rml1\", \"rml1-25um\", \"roland-nc\", or give a file as ./zz.toml"
         );
     }
 }

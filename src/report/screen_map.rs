@@ -98,9 +98,11 @@ fn draw(map: &ScreenMap) -> Drawn {
     let part_on_screen = match (map.screen_mm, screen) {
         (Some((whole, corner)), Some(outer)) => {
             let s = fit(whole);
-            // A speck of a part is still to be seen.
+            // A speck of a part is still to be seen, and on the screen.
             let [w, h] = map.part_mm.map(|mm| (mm * s).max(3.0));
-            [outer[0] + corner[0] * s, outer[1] + outer[3] - corner[1] * s - h, w, h]
+            let x = (outer[0] + corner[0] * s).min(outer[0] + outer[2] - w).max(outer[0]);
+            let y = (outer[1] + outer[3] - corner[1] * s - h).max(outer[1]);
+            [x, y, w, h]
         }
         _ => [0.0; 4],
     };
