@@ -152,8 +152,15 @@ fn judged(
         .collect();
     progress.begin("shanks", 1);
     let nose_mm = shop.machine.spindle.nose_diameter_mm;
-    let bodies: Vec<_> = shop.tools.iter().map(|tool| tool.cylinders(nose_mm)).collect();
-    let body_hits = judged.iter().map(|programs| verify::body_hits(&blank, programs, &bodies)).collect();
+    // An operation may be several programs.
+    let bodies = |post: &PostPrograms| -> Vec<_> {
+        post.programs.iter().map(|program| shop.tools[program.operation].cylinders(nose_mm)).collect()
+    };
+    let body_hits = posts
+        .iter()
+        .zip(&judged)
+        .map(|(post, programs)| verify::body_hits(&blank, programs, &bodies(post)))
+        .collect();
     let cutters = distinct(reaching(shop).into_iter(), step_mm)?;
     let (names, candidates) = candidates(shop, step_mm)?;
     let steepest = part.whole.steepest();

@@ -29,7 +29,7 @@ pub struct BodyHit {
     pub line: u32,
 }
 
-/// The deepest hit of each program, in their order; `bodies` are the cylinders above each one's cutter.
+/// The deepest hit of each program, in their order; `bodies` are the cylinders above the cutter of each program.
 ///
 /// On the lattice a cylinder is larger by half the diagonal of a cell, so it touches a sample wherever it touches the
 /// metal around it; what stands higher between samples than at them is missed by at most the metal's slope times
