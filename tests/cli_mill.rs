@@ -224,6 +224,73 @@ fn every_way_to_cut_keeps_the_limit() {
     }
 }
 
+/// Deviation, gouge and light are of what the text of the programs leaves: one Z word changes each.
+#[test]
+fn one_wrong_z_word_changes_deviation_gouge_and_light() {
+    let bench = Bench::with(&[]);
+    let said = bench.run("mill job.toml --out out --quiet").success();
+    let said = String::from_utf8(said.get_output().stdout.clone()).expect("text");
+    let line = said.lines().find_map(|line| line.strip_prefix("check     screenmill ")).expect("a command");
+    bench.run("design screen.toml --out d.npz --cells 324 149 325 150 --quiet").success();
+    let judged = |code: i32| {
+        bench.run(&format!("{line} --quiet")).code(code);
+        let folder = "out/simulate-r0c0";
+        bench.run(&format!(
+            "light d.npz --surface {folder}/machined.tif --screen screen.toml --out lit --quiet"
+        ));
+        let (cut, lit) = (bench.json(&format!("{folder}/report.json")), bench.json("lit/report.json"));
+        let light = lit["light"]["on_audience_machined"].as_f64().expect("a share");
+        [figure(&cut, "deviation_p99_mm"), figure(&cut, "gouge_max_mm"), light]
+    };
+    let sound = judged(0);
+    assert!(sound[1] <= 0.002);
+    // The report of the job itself says the same of the same files.
+    let report = bench.json("out/report.json");
+    assert!((figure(&report, "gouge_max_mm") - sound[1]).abs() < 1e-6, "{sound:?} {report}");
+    let light = report["light"]["on_audience_machined"].as_f64().expect("a share");
+    assert!((light - sound[2]).abs() < 0.002, "{light} {sound:?}");
+
+    let file = "out/programs/r0c0-02-finish-ball-1.ngc";
+    let text = bench.text(file);
+    // The middle one of the Z words, 0.2 mm deeper.
+    let places: Vec<usize> = text.match_indices('Z').map(|(at, _)| at + 1).collect();
+    let at = places[places.len() / 2];
+    let end = at + text[at..].find(|c: char| !"-.0123456789".contains(c)).expect("more text");
+    let z_mm: f64 = text[at..end].parse().expect("a number");
+    bench.write(file, format!("{}{:.4}{}", &text[..at], z_mm - 0.2, &text[end..]));
+    let wrong = judged(1);
+    assert!(wrong[1] > 0.1, "gouge: {sound:?}, then {wrong:?}");
+    assert!(wrong[0] > 1.1 * sound[0], "deviation: {sound:?}, then {wrong:?}");
+    assert!(wrong[2] < sound[2] - 1e-3, "light: {sound:?}, then {wrong:?}");
+}
+
+/// Polishing by hand takes off ridges, here those that a stepover of 0.1 mm leaves: more light comes than from the cut, never
+/// more than from the design. What the model says stands beside the cut, which it leaves as it was.
+#[test]
+fn the_light_of_a_polished_cut_stands_beside_that_of_the_cut() {
+    let plain = Bench::with(&[]).mill(0);
+    assert!(plain["light"].get("polished").is_none());
+    let polished = |um: &str| {
+        let bench = Bench::with(&[("[limits]", &format!("[polish]\nremoval_um = {um}\n[limits]"))]);
+        let report = bench.mill(0);
+        assert_eq!(report["light"]["on_audience_machined"], plain["light"]["on_audience_machined"]);
+        assert_eq!(report["fidelity"], plain["fidelity"]);
+        let polished = &report["light"]["polished"];
+        let shares =
+            ["on_audience", "leak", "absorbed", "unresolved"].map(|k| polished[k].as_f64().expect(k));
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{polished}");
+        shares[0]
+    };
+    let (little, much) = (polished("0.5"), polished("20"));
+    let [cut, design] =
+        ["machined", "designed"].map(|of| plain["light"][format!("on_audience_{of}")].as_f64());
+    let lights = [cut.expect("a share"), little, much, design.expect("a share")];
+    assert!(lights.is_sorted_by(|a, b| b - a > 0.01), "cut, 0.5 um, 20 um, design: {lights:?}");
+    let bench = Bench::with(&[("[limits]", "[polish]\nremoval_um = -1\n[limits]")]);
+    bench.run("mill job.toml --out out --quiet").code(2).stderr(contains("polish.removal_um"));
+    assert!(!bench.path("out").exists());
+}
+
 #[test]
 fn a_wall_is_not_cut_and_an_open_edge_is() {
     let low = |edge: &str| {
@@ -238,10 +305,12 @@ fn a_wall_is_not_cut_and_an_open_edge_is() {
     assert!(figure(&report, "cavity_area_fraction") > 0.05, "the wall keeps the ball off the edge: {report}");
 }
 
-/// A pit 7 mm deep with upright walls, cut with a ball whose neck is 4 mm long.
+/// A pit 7 mm deep with upright walls, cut with a ball whose neck is 4 mm long after a flat whose neck is 12, and
+/// which wears out on the way, so that its operation is several programs.
 #[test]
 fn a_shank_that_rubs_is_found_and_its_programs_are_set_aside() {
     let bench = Bench::with(&[
+        ("[limits]", "[tools]\nlibrary = \"short-lived.toml\"\n[limits]"),
         ("screen = \"screen.toml\"\ncells = [324, 149, 325, 150]", "heights = \"pit.npy\"\npixel_mm = 0.1"),
         ("step_mm = 0.02", "step_mm = 0.1"),
         ("thickness_mm = 10", "thickness_mm = 15"),
@@ -261,12 +330,19 @@ fn a_shank_that_rubs_is_found_and_its_programs_are_set_aside() {
         }
     }
     bench.write("pit.npy", npy);
+    let library =
+        include_str!("../samples/tools.toml").replacen("tool_life_m = 300", "tool_life_m = 0.05", 1);
+    bench.write("short-lived.toml", library);
     let report = bench.mill(1);
+    let files = programs(&report);
+    assert!(files.len() > 4 && files[3].contains("01-rough-flat-3-s04"), "{files:?}");
     let findings = report["findings"].as_array().expect("findings");
-    let hit = findings.iter().find(|finding| finding["code"] == "holder").expect("the shank is found");
-    let message = hit["message"].as_str().expect("a message");
+    let hits: Vec<_> = findings.iter().filter(|finding| finding["code"] == "holder").collect();
+    assert_eq!(hits.len(), 1, "of the ball alone: {hits:?}");
+    let message = hits[0]["message"].as_str().expect("a message");
     assert!(
-        message.contains("02-finish-ball-1") && message.contains("the shank of ball-1 is 3."),
+        message.starts_with("rejected/r0c0-02-finish-ball-1")
+            && message.contains("the shank of ball-1 is 3."),
         "{message}"
     );
     assert!(programs(&report).iter().all(|file| file.starts_with("rejected/")));

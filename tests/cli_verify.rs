@@ -123,6 +123,38 @@ fn a_program_for_another_origin_is_told() {
     );
 }
 
+/// What a program may do and should not, each told by its code.
+#[test]
+fn what_a_program_should_not_do_is_told() {
+    let dir = tempfile::tempdir().expect("a folder");
+    part(dir.path());
+    let sound = program(0.0);
+    let codes = |text: &str, more: &[&str]| -> Vec<String> {
+        std::fs::write(dir.path().join("p.ngc"), text).expect("a program");
+        let _ = std::fs::remove_dir_all(dir.path().join("out"));
+        simulate(dir.path(), more);
+        let report = report(dir.path());
+        let findings = report["findings"].as_array().expect("findings");
+        findings.iter().map(|finding| finding["code"].as_str().expect("a code").to_string()).collect()
+    };
+    let machine = ["--machine", "linuxcnc-mill"];
+    let odd = ["feed", "plunge", "ends-low", "off-centre", "elsewhere"];
+    let plain = codes(&sound, &machine);
+    assert!(plain.iter().all(|code| !odd.contains(&code.as_str())), "{plain:?}");
+    let told = |code: &str, text: &str, more: &[&str]| {
+        let codes = codes(text, more);
+        assert!(codes.iter().any(|found| found == code), "{code} is not in {codes:?}");
+    };
+    told("feed", &sound.replacen("F320", "F90000", 1), &machine);
+    told("feed", &sound.replacen("F100", "F90000", 1), &machine);
+    // 0.7 mm straight down, with a ball of 0.5 mm radius.
+    told("plunge", &sound.replacen("G0 Z2\n", "G0 Z2\nG0 X5.5 Y2\nG1 Z-0.5 F100\nG0 Z2\n", 1), &[]);
+    let end = sound.rfind("G0 Z2").expect("a retract");
+    told("ends-low", &format!("{}M5\nM2\n", &sound[..end]), &[]);
+    told("off-centre", &sound, &["--zero", "3", "0", "5.4"]);
+    told("elsewhere", &sound, &["--zero", "30", "0", "5.4"]);
+}
+
 #[test]
 fn another_cutter_shows_as_gouge() {
     let dir = tempfile::tempdir().expect("a folder");

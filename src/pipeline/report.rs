@@ -134,7 +134,7 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
         found.push(finding(Severity::Warning, "undercut", message).on(&name));
     }
     for post in 0..result.posts.len() {
-        let mut bad = Vec::new();
+        let mut of_post = Vec::new();
         let figures = result.tally(post).figures();
         if figures.gouge_max_mm > gouge_limit_mm {
             let message = format!(
@@ -142,19 +142,22 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
                 result.posts[post].dialect, figures.gouge_max_mm
             );
             let place = figures.gouge_where_mm.unwrap_or_default();
-            bad.push(finding(Severity::Error, "gouge", message).on(&name).at(&result.in_part(place)));
+            of_post.push(finding(Severity::Error, "gouge", message).on(&name).at(&result.in_part(place)));
         }
         if figures.samples == 0 {
             let message = format!("{}: nothing was judged", result.posts[post].dialect);
-            bad.push(finding(Severity::Error, "unjudged", message).on(&name));
+            of_post.push(finding(Severity::Error, "unjudged", message).on(&name));
         }
+        let mut of_programs = Vec::new();
         for (index, program) in result.posts[post].programs.iter().enumerate() {
             let cut = &result.verdict.cuts[post][index];
-            bad.extend(of_motions(shop, result, post, index));
-            found.extend(of_rounding(result, program));
-            found.extend(of_wear(shop, program, cut).into_iter().map(|f| f.on(&name)));
+            let mut remarks = Vec::from_iter(of_rounding(result, program));
+            remarks.extend(of_wear(shop, program, cut));
+            remarks.extend(of_motions(shop, result, post, index));
+            of_programs.push(remarks);
         }
-        if !bad.is_empty() {
+        let remarked = of_programs.iter().flatten().map(|remark| &remark.finding);
+        if of_post.iter().chain(remarked).any(|found| found.severity == Severity::Error) {
             for program in &mut result.posts[post].programs {
                 let away = TileResult::rejected(&program.file);
                 let (from, to) = (staging.join(&program.file), staging.join(&away));
@@ -166,109 +169,126 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
                 program.file = away;
             }
         }
-        found.extend(bad);
+        for (program, remarks) in result.posts[post].programs.iter().zip(of_programs) {
+            found.extend(remarks.into_iter().map(|remark| remark.on(program).on(&name)));
+        }
+        found.extend(of_post);
     }
     Ok(found)
 }
 
+/// A finding on a program before it is known where its file goes.
+struct Remark {
+    /// Of the program's text.
+    line: Option<u32>,
+    finding: Finding,
+}
+
+impl Remark {
+    fn new(severity: Severity, code: &'static str, line: Option<u32>, message: String) -> Remark {
+        Remark { line, finding: finding(severity, code, message) }
+    }
+
+    fn at(self, place_mm: &[f64]) -> Remark {
+        Remark { finding: self.finding.at(place_mm), ..self }
+    }
+
+    fn on(mut self, program: &Program) -> Finding {
+        let line = self.line.map_or(String::new(), |line| format!(":{line}"));
+        self.finding.message = format!("{}{line}: {}", program.file.display(), self.finding.message);
+        self.finding
+    }
+}
+
 /// Errors of one program's motions.
-fn of_motions(shop: &Shop, result: &TileResult, post: usize, index: usize) -> Vec<Finding> {
+fn of_motions(shop: &Shop, result: &TileResult, post: usize, index: usize) -> Vec<Remark> {
     let tile = &result.tile;
-    let name = &tile.setup.tile.name;
     let program = &result.posts[post].programs[index];
     let cut = &result.verdict.cuts[post][index];
-    let file = program.file.display();
     let mut found = Vec::new();
     let tool = &shop.tools[program.operation];
     let bounds = plan::bounds_over_stock(&program.extent, tile);
     let checked = tile.setup.check(&bounds, shop.fixture.sacrificial_mm, &shop.machine);
     if let Err(refusal) = checked {
-        found.push(finding(Severity::Error, "travel", format!("{file}: {refusal}")).on(name));
+        found.push(Remark::new(Severity::Error, "travel", None, refusal.to_string()));
     }
     let guard = Guard::new(&tile.setup.obstacles, tool.columns(shop.machine.spindle.nose_diameter_mm));
     let motions = &program.reading.motions;
     let met = guard.first_met(motions.len(), |index| plan::over_stock(motions[index].to_mm, tile));
     if let Some(met) = met {
         let message = format!(
-            "{file}:{}: the {} of {} runs into \"{}\", {:.3} mm below its top ({} mm above the stock); hint: a larger margin_mm, another fixture or a tool that sticks out further",
-            motions[met.motion].line, met.what, tool.name, met.obstacle, met.below_mm, met.top_mm
+            "the {} of {} runs into \"{}\", {:.3} mm below its top ({} mm above the stock); hint: a larger margin_mm, another fixture or a tool that sticks out further",
+            met.what, tool.name, met.obstacle, met.below_mm, met.top_mm
         );
         let place = result.in_part([met.at_mm[0], met.at_mm[1]]);
-        found.push(finding(Severity::Error, "clamp", message).on(name).at(&place));
+        found.push(Remark::new(Severity::Error, "clamp", Some(motions[met.motion].line), message).at(&place));
     }
     if let Some(hit) = result.body_hits[post][index] {
         let message = format!(
-            "{file}:{}: the {} of {} is {:.3} mm too deep in the metal beside the cutter; hint: a tool with a longer neck, an operation that clears more before it, or level = \"plane\"",
-            hit.line, hit.what, tool.name, hit.depth_mm
+            "the {} of {} is {:.3} mm too deep in the metal beside the cutter; hint: a tool with a longer neck, an operation that clears more before it, or level = \"plane\"",
+            hit.what, tool.name, hit.depth_mm
         );
         let place = result.in_part([hit.at_mm[0], hit.at_mm[1]]);
-        found.push(finding(Severity::Error, "holder", message).on(name).at(&place));
+        found.push(Remark::new(Severity::Error, "holder", Some(hit.line), message).at(&place));
     }
     if let Some(bite) = cut.rapid {
-        let message =
-            format!("{file}:{}: a rapid goes {:.4} mm deep through the stock", bite.line, bite.depth_mm);
+        let message = format!("a rapid goes {:.4} mm deep through the stock", bite.depth_mm);
         let place = result.in_part([bite.at_mm[0], bite.at_mm[1]]);
-        found.push(finding(Severity::Error, "rapid-through-stock", message).on(name).at(&place));
+        found.push(Remark::new(Severity::Error, "rapid-through-stock", Some(bite.line), message).at(&place));
     }
     if let Some(rapid) = &result.lateral_rapids[post][index] {
-        let message = format!(
-            "{file}:{}: a rapid in X or Y runs {:.4} mm below the stock's top",
-            rapid.line, rapid.below_mm
-        );
-        found.push(finding(Severity::Error, "lateral-rapid", message).on(name));
+        let message = format!("a rapid in X or Y runs {:.4} mm below the stock's top", rapid.below_mm);
+        found.push(Remark::new(Severity::Error, "lateral-rapid", Some(rapid.line), message));
     }
     if !cut.touched() {
-        let message = format!("{file}: cuts nothing; hint: leave the operation out");
-        found.push(finding(Severity::Warning, "air", message).on(name));
+        let message = "cuts nothing; hint: leave the operation out".to_string();
+        found.push(Remark::new(Severity::Warning, "air", None, message));
     }
     found
 }
 
 /// How far the controller's grid turns the mirrors, as planned: what an operator can know before the cut.
-fn of_rounding(result: &TileResult, program: &Program) -> Option<Finding> {
+fn of_rounding(result: &TileResult, program: &Program) -> Option<Remark> {
     let tilt = program.tilt?;
     let (rms_deg, worst) = (tilt.rms_deg()?, tilt.worst?);
     let message = format!(
-        "{}: rounding and simplification turn mirrors along the passes by {rms_deg:.3} degrees rms, at most {:.3} degrees over {:.2} mm",
-        program.file.display(),
-        worst.deg,
-        worst.length_mm
+        "rounding and simplification turn mirrors along the passes by {rms_deg:.3} degrees rms, at most {:.3} degrees over {:.2} mm",
+        worst.deg, worst.length_mm
     );
-    let note = finding(Severity::Note, "rounding-tilt", message).on(&result.tile.setup.tile.name);
+    let note = Remark::new(Severity::Note, "rounding-tilt", None, message);
     Some(note.at(&result.in_part(worst.at_mm)))
 }
 
 /// What a program asks of its cutter, and what its reader noticed.
-fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Finding> {
+fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> {
     let tool = &shop.tools[program.operation];
-    let file = program.file.display();
     let mut found = Vec::new();
     let bite_mm = cut.deepest_bite_mm();
     if let Some(most_mm) = tool.max_depth_mm
         && bite_mm > most_mm
     {
         let message = format!(
-            "{file}: {} bites {bite_mm:.3} mm deep at once, its max_depth_mm is {most_mm}; hint: a smaller stepdown, or a semi-finish before it",
+            "{} bites {bite_mm:.3} mm deep at once, its max_depth_mm is {most_mm}; hint: a smaller stepdown, or a semi-finish before it",
             tool.name
         );
-        found.push(finding(Severity::Warning, "bite", message));
+        found.push(Remark::new(Severity::Warning, "bite", None, message));
     }
     let length_m = program.extent.cutting_mm * 1e-3;
     if let Some(life_m) = tool.tool_life_m
         && length_m > life_m
     {
         let message = format!(
-            "{file}: {length_m:.0} m of cut without a retract, {} lasts {life_m} m; hint: pattern = \"one-way\" can be cut in sections at every pass",
+            "{length_m:.0} m of cut without a retract, {} lasts {life_m} m; hint: pattern = \"one-way\" can be cut in sections at every pass",
             tool.name
         );
-        found.push(finding(Severity::Warning, "tool-life", message));
+        found.push(Remark::new(Severity::Warning, "tool-life", None, message));
     }
     if let Some(section) = program.section.filter(|section| section.index == 1) {
         let message = format!(
-            "{file}: the first of {} sections; the setup sheet says where a fresh {} begins",
+            "the first of {} sections; the setup sheet says where a fresh {} begins",
             section.count, tool.name
         );
-        found.push(finding(Severity::Note, "sections", message));
+        found.push(Remark::new(Severity::Note, "sections", None, message));
     }
     // RML-1 has no rapid word, so that its travel above the part is a feed like any other.
     let gcode = program.reading.summary.language == Language::GCode;
@@ -278,22 +298,20 @@ fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Finding> {
         (feeds.plunge, tool.plunge_mm_min, "plunge_mm_min"),
     ] {
         if let Some(fastest) = fastest.filter(|fastest| gcode && fastest.feed_mm_min > most + 1e-3) {
-            let message = format!(
-                "{file}:{}: feeds {} mm/min, the {key} of {} is {most}",
-                fastest.line, fastest.feed_mm_min, tool.name
-            );
-            found.push(finding(Severity::Warning, "feed", message));
+            let message =
+                format!("feeds {} mm/min, the {key} of {} is {most}", fastest.feed_mm_min, tool.name);
+            found.push(Remark::new(Severity::Warning, "feed", Some(fastest.line), message));
         }
     }
     if let Some(bite) = cut.plunge.filter(|bite| bite.depth_mm > tool.shape.radius_mm()) {
         let message = format!(
-            "{file}:{}: plunges {:.3} mm straight down into solid, more than the radius of {}; hint: a smaller stepdown",
-            bite.line, bite.depth_mm, tool.name
+            "plunges {:.3} mm straight down into solid, more than the radius of {}; hint: a smaller stepdown",
+            bite.depth_mm, tool.name
         );
-        found.push(finding(Severity::Warning, "plunge", message));
+        found.push(Remark::new(Severity::Warning, "plunge", Some(bite.line), message));
     }
     for note in &program.reading.summary.notes {
-        found.push(finding(Severity::Note, "program", format!("{file}: {note}")));
+        found.push(Remark::new(Severity::Note, "program", None, note.to_string()));
     }
     found
 }

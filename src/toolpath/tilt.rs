@@ -4,8 +4,8 @@
 use super::ends::{Measure, weights};
 use super::funnel::Vertex;
 
-/// The slope error of a path along its passes, where it follows planes: a ball on a straight move makes a
-/// surface of just that slope. Creases and fillets, where it rolls over or rests on two faces, do not count.
+/// By how much mirrors are turned along the passes: each stretch of a pass that follows a plane, as a whole. Creases and
+/// fillets, where the cutter rolls over or rests on two faces, do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tilt {
     /// Square degrees times positions.
@@ -25,7 +25,8 @@ pub struct Worst {
 }
 
 impl Tilt {
-    /// Root of the mean square error in degrees; None where no plane was followed.
+    /// Root of the mean square over the mirrors' lengths in degrees, no more than the worst; None where no plane was
+    /// followed.
     pub fn rms_deg(&self) -> Option<f64> {
         (self.positions > 0.0).then(|| (self.squares / self.positions).sqrt())
     }
@@ -55,9 +56,6 @@ impl Tilt {
     ) {
         let weights = weights(exact, measure);
         let plane = |i: usize| (0.5..1.5).contains(&weights[i]);
-        let degrees = |rise: f64, positions: f64| {
-            (rise * measure.unit_mm / (positions * measure.pitch_mm)).atan().to_degrees()
-        };
         let Some(&(_, start)) = vertices.first() else { return };
         let (mut first, mut above) = (0, f64::from(start) - exact[0]);
         for pair in vertices.windows(2) {
@@ -66,22 +64,19 @@ impl Tilt {
             let line = |i: usize| f64::from(za) + slope * (i - a) as f64;
             for i in a + 1..=b {
                 let on = plane(i - 1) && plane(i);
-                if on {
-                    let off = degrees(slope, 1.0) - degrees(exact[i] - exact[i - 1], 1.0);
-                    self.squares += off * off;
-                    self.positions += 1.0;
-                }
                 if !on || i + 1 == exact.len() {
                     let end = if on { i } else { i - 1 };
                     let length_mm = (end - first) as f64 * measure.pitch_mm;
                     // Shorter stretches are slivers beside a crease.
                     if length_mm >= measure.stepover_mm && end > first {
                         let turned = line(end) - exact[end] - above;
-                        self.meet(Worst {
-                            deg: degrees(turned, (end - first) as f64).abs(),
-                            length_mm,
-                            at_mm: place_mm(first.midpoint(end)),
-                        });
+                        let positions = (end - first) as f64;
+                        let deg =
+                            (turned * measure.unit_mm / (positions * measure.pitch_mm)).atan().to_degrees();
+                        self.squares += deg * deg * positions;
+                        self.positions += positions;
+                        let at_mm = place_mm(first.midpoint(end));
+                        self.meet(Worst { deg: deg.abs(), length_mm, at_mm });
                     }
                     (first, above) = (i, line(i) - exact[i]);
                 }
@@ -106,7 +101,7 @@ mod tests {
         assert!((worst.deg - (1.0f64 / 40.0).atan().to_degrees()).abs() < 1e-9, "{worst:?}");
         assert_eq!((worst.at_mm, worst.length_mm), ([20.0, 7.0], 0.4));
         let rms = tilt.rms_deg().unwrap();
-        assert!((rms - (0.225f64.atan() - 0.2f64.atan()).to_degrees()).abs() < 1e-9, "{rms}");
+        assert!((rms - worst.deg).abs() < 1e-12, "the only mirror is the worst: {rms}");
     }
 
     #[test]
