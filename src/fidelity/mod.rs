@@ -3,6 +3,7 @@
 //! [`Tally`] counts and [`Cavities`] joins block by block, so that no layer of a tile is ever held; both give the
 //! same bits however a tile is cut into blocks.
 
+mod bound;
 pub mod cavities;
 mod histogram;
 pub mod light;
@@ -11,6 +12,7 @@ mod pixels;
 pub mod polish;
 mod tally;
 
+pub use bound::Peaks;
 pub use cavities::{Cavities, Cavity, Found};
 pub use histogram::Histogram;
 pub use outline::Outline;

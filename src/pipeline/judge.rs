@@ -8,7 +8,7 @@ use super::light::{self, Sight};
 use crate::compensation::{self, Profile, RowPass, RowTarget};
 use crate::fidelity::cavities::{self, Labelled};
 use crate::fidelity::light::LightTally;
-use crate::fidelity::{self, Cavities, Found, Layers, Pixels, Tally, polish};
+use crate::fidelity::{self, Cavities, Found, Layers, Peaks, Pixels, Tally, polish};
 use crate::grid::{Heights, Lattice, Window};
 use crate::progress::Progress;
 use crate::surface::Surface;
@@ -276,20 +276,21 @@ impl Case<'_> {
         }
     }
 
-    /// Minimum over the cutters of the closing, less the design.
+    /// Minimum over the cutters of the closing, less the design. The smallest cutter is closed with everywhere,
+    /// others where they could get lower.
     fn cavity(&self, around: &Heights, design: &Heights) -> Heights {
-        let mut lowest: Option<Heights> = None;
-        for profile in self.cutters {
-            let closing = compensation::closing(around, profile, design.window);
-            match &mut lowest {
-                None => lowest = Some(closing),
-                Some(lowest) => lower(lowest, &closing),
+        let mut cutters: Vec<&Profile> = self.cutters.iter().collect();
+        cutters.sort_by(|a, b| a.radius_mm().total_cmp(&b.radius_mm()));
+        let Some((smallest, others)) = cutters.split_first() else { return Heights::empty(design.window) };
+        let mut lowest = compensation::closing(around, smallest, design.window);
+        let peaks = (!others.is_empty()).then(|| Peaks::new(around));
+        for (profile, peaks) in others.iter().zip(peaks.iter().cycle()) {
+            let step_mm = self.surface.lattice().step_mm;
+            if let Some(within) = peaks.lower_within(&profile.shape(), step_mm, &lowest) {
+                lower(&mut lowest, &compensation::closing(around, profile, within));
             }
         }
-        match lowest {
-            Some(closing) => compensation::residual(&closing, design),
-            None => Heights::empty(design.window),
-        }
+        compensation::residual(&lowest, design)
     }
 
     /// What the passes leave before any simplification and rounding; None where they run at an angle to the
@@ -347,9 +348,14 @@ impl ExactPasses {
     }
 }
 
+/// Takes the lower of both where `other` is.
 fn lower(lowest: &mut Heights, other: &Heights) {
-    for (z, other) in lowest.z_mm.iter_mut().zip(&other.z_mm) {
-        *z = z.min(*other);
+    let (window, part) = (lowest.window, other.window);
+    for row in part.row..part.row_end() {
+        let start = (row - window.row) as usize * window.columns + (part.column - window.column) as usize;
+        for (z, other) in lowest.z_mm[start..start + part.columns].iter_mut().zip(other.row(row)) {
+            *z = z.min(*other);
+        }
     }
 }
 

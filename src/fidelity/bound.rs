@@ -1,0 +1,250 @@
+//! How low a cutter could get at best, from the highest samples of small blocks: what a closing is good for is known
+//! of most places without making it.
+
+use crate::cutter::Shape;
+use crate::grid::{Heights, Window};
+
+/// Samples along the side of a block.
+const BLOCK: i64 = 16;
+/// More than the rounding of heights as floats, in mm; a flat's are not rounded at all.
+const ROUNDED_MM: f64 = 1e-5;
+
+/// The highest sample of each block of a window, minus infinity where there is none.
+pub struct Peaks {
+    /// In blocks, counted from the part's corner.
+    blocks: Window,
+    z_mm: Vec<f32>,
+}
+
+impl Peaks {
+    /// Looks over heights.
+    pub fn new(heights: &Heights) -> Peaks {
+        let window = heights.window;
+        let blocks = blocks(window);
+        let mut z_mm = vec![f32::NEG_INFINITY; blocks.samples()];
+        for row in window.row..window.row_end() {
+            let start = (row.div_euclid(BLOCK) - blocks.row) as usize * blocks.columns;
+            let peaks = &mut z_mm[start..start + blocks.columns];
+            let line = heights.row(row);
+            let mut at = window.column;
+            for peak in peaks {
+                let end = ((at.div_euclid(BLOCK) + 1) * BLOCK).min(window.column_end());
+                let part = &line[(at - window.column) as usize..(end - window.column) as usize];
+                *peak = part.iter().fold(*peak, |most, z| higher(most, *z));
+                at = end;
+            }
+        }
+        Peaks { blocks, z_mm }
+    }
+
+    /// Where in a window a cutter's closing could be lower than `lowest`: a window that holds all such samples. The
+    /// heights looked over should reach as far around as those that the closing would be made from.
+    pub fn lower_within(&self, shape: &Shape, step_mm: f64, lowest: &Heights) -> Option<Window> {
+        let wanted = blocks(lowest.window);
+        let reach = (shape.radius_mm() / (BLOCK as f64 * step_mm)).ceil() as i64 + 1;
+        let standing = self.standing(shape, step_mm, wanted.grown(reach as usize), reach);
+        let least = eroded(shape, step_mm, &standing, wanted, reach);
+        let mut found: Option<[i64; 4]> = None;
+        for row in wanted.row..wanted.row_end() {
+            for column in wanted.column..wanted.column_end() {
+                let block = Window {
+                    column: column * BLOCK,
+                    row: row * BLOCK,
+                    columns: BLOCK as usize,
+                    rows: BLOCK as usize,
+                };
+                let Some(part) = lowest.window.intersection(&block) else { continue };
+                let bound = least.z_mm
+                    [(row - wanted.row) as usize * wanted.columns + (column - wanted.column) as usize];
+                let most = (part.row..part.row_end()).map(|row| {
+                    let from = (part.column - lowest.window.column) as usize;
+                    let line = &lowest.row(row)[from..from + part.columns];
+                    line.iter().fold(f32::NEG_INFINITY, |most, z| higher(most, *z))
+                });
+                if most.fold(f32::NEG_INFINITY, f32::max) > bound {
+                    let ends = [part.column, part.row, part.column_end(), part.row_end()];
+                    found = Some(found.map_or(ends, |f| {
+                        [f[0].min(ends[0]), f[1].min(ends[1]), f[2].max(ends[2]), f[3].max(ends[3])]
+                    }));
+                }
+            }
+        }
+        found.map(|[column, row, column_end, row_end]| Window {
+            column,
+            row,
+            columns: (column_end - column) as usize,
+            rows: (row_end - row) as usize,
+        })
+    }
+
+    /// The lowest that the cutter could stand at any sample of each block.
+    fn standing(&self, shape: &Shape, step_mm: f64, out: Window, reach: i64) -> Heights {
+        let mut standing = Heights { window: out, z_mm: vec![f32::NEG_INFINITY; out.samples()] };
+        each_offset(
+            shape,
+            step_mm,
+            reach,
+            |blocks| blocks * BLOCK + BLOCK - 1,
+            |[across, up], rise| {
+                for row in out.row..out.row_end() {
+                    let from = row + up;
+                    if from < self.blocks.row || from >= self.blocks.row_end() {
+                        continue;
+                    }
+                    let first = out.column.max(self.blocks.column - across);
+                    let end = out.column_end().min(self.blocks.column_end() - across);
+                    if first >= end {
+                        continue;
+                    }
+                    let count = (end - first) as usize;
+                    let to = (row - out.row) as usize * out.columns + (first - out.column) as usize;
+                    let at = (from - self.blocks.row) as usize * self.blocks.columns
+                        + (first + across - self.blocks.column) as usize;
+                    for (z, peak) in standing.z_mm[to..to + count].iter_mut().zip(&self.z_mm[at..at + count])
+                    {
+                        let stands = peak - rise;
+                        *z = if stands > *z { stands } else { *z };
+                    }
+                }
+            },
+        );
+        standing
+    }
+}
+
+/// The lowest that a cutter which stands no lower than this leaves of any sample of each block.
+fn eroded(shape: &Shape, step_mm: f64, standing: &Heights, out: Window, reach: i64) -> Heights {
+    let mut least = Heights { window: out, z_mm: vec![f32::INFINITY; out.samples()] };
+    let from = standing.window;
+    each_offset(
+        shape,
+        step_mm,
+        reach,
+        |blocks| (blocks * BLOCK - BLOCK + 1).max(0),
+        |[across, up], rise| {
+            for row in out.row..out.row_end() {
+                let to = (row - out.row) as usize * out.columns;
+                let at = (row + up - from.row) as usize * from.columns
+                    + (out.column + across - from.column) as usize;
+                for (z, stands) in
+                    least.z_mm[to..to + out.columns].iter_mut().zip(&standing.z_mm[at..at + out.columns])
+                {
+                    let left = stands + rise;
+                    *z = if left < *z { left } else { *z };
+                }
+            }
+        },
+    );
+    least
+}
+
+/// Every offset between blocks within the cutter, and the cutter's rise there, less or more its rounding; `samples`
+/// gives the distance along an axis that counts for blocks so far apart.
+fn each_offset(
+    shape: &Shape,
+    step_mm: f64,
+    reach: i64,
+    samples: impl Fn(i64) -> i64,
+    mut each: impl FnMut([i64; 2], f32),
+) {
+    // Of the samples' distances the nearest counts with the lower rise, the farthest with the higher.
+    let nearest = samples(0) == 0;
+    for up in -reach..=reach {
+        for across in -reach..=reach {
+            let [x, y] = [across, up].map(|blocks| samples(blocks.abs()) as f64 * step_mm);
+            let r_mm = x.hypot(y);
+            let inside = if nearest { r_mm - 1e-9 } else { r_mm + 1e-9 };
+            let Some(rise) = shape.height_mm(inside.max(0.0)) else { continue };
+            let rounded = if rise == 0.0 { 0.0 } else { ROUNDED_MM };
+            each([across, up], (if nearest { rise - rounded } else { rise + rounded }) as f32);
+        }
+    }
+}
+
+/// The blocks that a window touches.
+fn blocks(window: Window) -> Window {
+    let (column, row) = (window.column.div_euclid(BLOCK), window.row.div_euclid(BLOCK));
+    Window {
+        column,
+        row,
+        columns: ((window.column_end() - 1).div_euclid(BLOCK) + 1 - column).max(0) as usize,
+        rows: ((window.row_end() - 1).div_euclid(BLOCK) + 1 - row).max(0) as usize,
+    }
+}
+
+/// The higher of two; no data is not.
+fn higher(most: f32, z: f32) -> f32 {
+    if z > most { z } else { most }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compensation::{Profile, closing};
+
+    const STEP_MM: f64 = 0.02;
+
+    /// Ridges and a pit with a floor, with a hole in it.
+    fn relief(window: Window) -> Heights {
+        let mut heights = Heights::empty(window);
+        for (index, z) in heights.z_mm.iter_mut().enumerate() {
+            let (c, r) = ((index % window.columns) as f32, (index / window.columns) as f32);
+            let pit = (60.0..190.0).contains(&c) && (70.0..150.0).contains(&r);
+            let ridges = -0.4 + 0.3 * (0.11 * c).sin() * (0.07 * r).cos();
+            *z = if pit { -1.5 } else { ridges };
+            if (c - 120.0).hypot(r - 100.0) < 9.0 {
+                *z = f32::NAN;
+            }
+        }
+        heights
+    }
+
+    #[test]
+    fn where_it_says_that_a_cutter_gets_no_lower_it_does_not() {
+        let around = relief(Window { column: -37, row: 11, columns: 300, rows: 240 });
+        let peaks = Peaks::new(&around);
+        let mut spared = 0;
+        for (name, other) in [
+            ("flat:1", "ball:0.4"),
+            ("ball:0.8", "flat:0.6"),
+            ("bull:1:0.2", "ball:0.4"),
+            ("vee:90:0.1:1", "ball:0.8"),
+        ] {
+            let shapes = [name, other].map(|text| text.parse::<Shape>().expect("a cutter"));
+            let [tried, known] = shapes.map(|shape| Profile::new(shape, STEP_MM, 0.0).expect("a profile"));
+            let reach = tried.reach().max(known.reach()) as i64;
+            let inner = around.window;
+            let inner = Window {
+                column: inner.column + 2 * reach,
+                row: inner.row + 2 * reach,
+                columns: inner.columns - 4 * reach as usize,
+                rows: inner.rows - 4 * reach as usize,
+            };
+            let (mut lowest, closed) = (closing(&around, &known, inner), closing(&around, &tried, inner));
+            for (z, design) in lowest.z_mm.iter_mut().zip(&around.crop(inner).z_mm) {
+                *z = if design.is_nan() { f32::NAN } else { *z };
+            }
+            let within = peaks.lower_within(&shapes[0], STEP_MM, &lowest);
+            for row in inner.row..inner.row_end() {
+                for (k, (a, b)) in closed.row(row).iter().zip(lowest.row(row)).enumerate() {
+                    let column = inner.column + k as i64;
+                    let inside = within.is_some_and(|w| {
+                        (w.column..w.column_end()).contains(&column) && (w.row..w.row_end()).contains(&row)
+                    });
+                    assert!(inside || b.is_nan() || a >= b, "{name} at {column}, {row}: {a} under {b}");
+                    spared += u32::from(!inside);
+                }
+            }
+        }
+        assert!(spared > 10_000, "the bound is good for something: {spared}");
+    }
+
+    #[test]
+    fn a_floor_that_a_ball_reaches_is_not_tried_with_a_flat() {
+        let window = Window { column: 0, row: 0, columns: 400, rows: 400 };
+        let floor = Heights { window, z_mm: vec![-1.0; window.samples()] };
+        let inner = Window { column: 150, row: 150, columns: 100, rows: 100 };
+        let flat = "flat:2".parse().expect("a cutter");
+        assert_eq!(Peaks::new(&floor).lower_within(&flat, STEP_MM, &floor.crop(inner)), None);
+    }
+}
