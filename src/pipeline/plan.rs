@@ -21,6 +21,10 @@ use crate::verify::{Extent, Reading, Timing};
 /// Passes between two places where a zigzag program can start again.
 const RESTART_PASSES: usize = 50;
 
+/// Cutting between two places where a program can be parted, in lives of the cutter and at most in mm.
+const RESTART_LIVES: f64 = 0.05;
+const RESTART_MM: f64 = 10e3;
+
 /// Room around a shank that goes below the stock's top.
 const SHANK_ROOM_MM: f64 = 0.2;
 
@@ -192,7 +196,10 @@ pub fn programs(
         let tool = &shop.tools[index];
         let guard = Guard::new(&tile.setup.obstacles, tool.columns(shop.machine.spindle.nose_diameter_mm));
         let above_mm = job.machine.clearance_mm;
-        let retract = (above_mm < tile.clearance_mm).then_some(Retract { above_mm, guard: &guard });
+        let life_mm = tool.tool_life_m.map_or(f64::INFINITY, |life_m| 1e3 * life_m);
+        let restart_mm = (RESTART_LIVES * life_mm).min(RESTART_MM);
+        let retract = Retract { above_mm, restart_mm, guard: &guard };
+        let retract = (above_mm < tile.clearance_mm).then_some(retract);
         let site = Site { retract, ..site };
         let refused = |source| Error::Toolpath {
             number: index + 1,

@@ -91,6 +91,8 @@ pub struct Site<'a> {
 pub struct Retract<'a> {
     /// Above the blank's top, in mm.
     pub above_mm: f64,
+    /// The first pass after so much cutting begins on the clearance plane, so that a program can be cut there.
+    pub restart_mm: f64,
     pub guard: &'a crate::machine::Guard,
 }
 

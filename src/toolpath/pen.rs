@@ -15,6 +15,8 @@ pub(super) struct Pen<'a> {
     path: Toolpath,
     at: Option<GridPoint>,
     begun: usize,
+    /// Length cut since the last pass that began on the clearance plane, in units.
+    cut: f64,
     clearance: i32,
     /// A lower plane in units, where there is one.
     retract: Option<(i32, Retract<'a>)>,
@@ -30,6 +32,7 @@ impl<'a> Pen<'a> {
             path: Toolpath { unit_mm: site.unit_mm, ..Toolpath::default() },
             at: None,
             begun: 0,
+            cut: 0.0,
             retract: site
                 .retract
                 .map(|plane| (site.unit_above(site.top_allowance_mm + plane.above_mm), plane)),
@@ -54,6 +57,7 @@ impl<'a> Pen<'a> {
         }
         if plane == self.clearance {
             self.path.pass_starts.push(self.path.moves.len());
+            self.cut = 0.0;
         }
         self.begun += 1;
         // Named even if the cutter stands there already: a program may start again here.
@@ -69,7 +73,8 @@ impl<'a> Pen<'a> {
     /// tool comes near what stands in the way.
     fn plane(&self, to: GridPoint) -> i32 {
         let (Some(at), Some((retract, plane))) = (self.at, self.retract) else { return self.clearance };
-        if self.begun.is_multiple_of(RESTART_PASSES) {
+        let far = self.cut * self.path.unit_mm > plane.restart_mm;
+        if far || self.begun.is_multiple_of(RESTART_PASSES) {
             return self.clearance;
         }
         let place = |p: GridPoint| {
@@ -88,6 +93,13 @@ impl<'a> Pen<'a> {
 
     fn go(&mut self, kind: Kind, to: GridPoint) {
         if self.at != Some(to) {
+            if let Some(at) = self.at
+                && kind != Kind::Rapid
+            {
+                let square: f64 =
+                    (0..3).map(|axis| f64::from(to[axis]) - f64::from(at[axis])).map(|d| d * d).sum();
+                self.cut += square.sqrt();
+            }
             self.path.moves.push(Move { kind, to });
             self.at = Some(to);
         }
