@@ -48,6 +48,16 @@ fn designing_a_few_cells_writes_them_and_says_so() {
 }
 
 #[test]
+fn stitched_cells_become_one_solid_that_can_be_read_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = coarse(folder.path(), "\"step\" ", "\"stitched\" ");
+    let [npz, stl, tif] = ["a.npz", "a.stl", "a.tif"].map(|name| folder.path().join(name));
+    let [npz, stl, tif] = [&npz, &stl, &tif].map(|path| path.to_str().expect("text"));
+    design(&[&scene, "--out", npz, "--stl", stl, "--cells", "3", "2", "5", "4"]).success();
+    screenmill(&["raster", stl, "--out", tif, "--step-mm", "5"]).success();
+}
+
+#[test]
 fn the_thread_count_does_not_change_a_byte() {
     let folder = tempfile::tempdir().expect("a folder");
     let made = ["1", "3"].map(|threads| {
@@ -127,12 +137,10 @@ fn a_refusal_is_one_message_and_leaves_nothing_behind() {
     design(&[&sample("theatre"), "--out", folder.path().to_str().expect("text")])
         .code(2)
         .stderr(predicate::str::contains("is a folder"));
-    let stitched = folder.path().join("stitched.toml");
-    let text = fs::read_to_string(sample("theatre")).expect("a sample").replace("\"step\" ", "\"stitched\" ");
-    fs::write(&stitched, text).expect("written");
-    design(&[stitched.to_str().expect("text"), "--out", out, "--stl", out, "--cells", "0", "0", "1", "1"])
+    design(&[&sample("theatre"), "--out", out, "--stl", out])
         .code(2)
-        .stderr(predicate::str::contains("a stitched design is not written as .stl"));
+        .stderr(predicate::str::contains("a.npz is asked for twice"));
+    assert!(is_empty(folder.path()));
 }
 
 #[test]

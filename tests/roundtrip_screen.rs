@@ -1,6 +1,6 @@
 //! Designs written and read back, and what they say of their own surface.
 
-use screenmill::screen::{self, CellRange, Design, Profile, Scene};
+use screenmill::screen::{self, CellRange, Design, Profile, Scene, Seam};
 
 /// The theatre at the elevation of all zeros: what is tested here is one cell at a time.
 fn theatre() -> Scene {
@@ -120,31 +120,94 @@ fn the_best_plane_of_a_tilted_design_is_its_tilt() {
     }
 }
 
+/// Triangles of a binary STL.
+fn triangles(path: &std::path::Path) -> Vec<[[f32; 3]; 3]> {
+    let bytes = std::fs::read(path).expect("a file");
+    let count = u32::from_le_bytes(bytes[80..84].try_into().expect("four bytes")) as usize;
+    assert_eq!(bytes.len(), 84 + 50 * count);
+    let number = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+    let corner = |at: usize| [number(at), number(at + 4), number(at + 8)];
+    (0..count).map(|k| 84 + 50 * k).map(|at| [corner(at + 12), corner(at + 24), corner(at + 36)]).collect()
+}
+
 #[test]
 fn solids_are_closed_and_hold_the_volume_under_the_surface() {
-    for profile in [Profile::Bump, Profile::Dish] {
-        let design = designed(profile);
-        let cell = design.cell(325, 150).expect("the cell");
-        let base = cell.elevation_mm - 2.0;
-        let solid = design.solid(cell, base).expect("closed");
-        let mut edges = std::collections::BTreeMap::new();
-        let mut volume = 0.0;
-        for triangle in &solid {
-            let v = triangle.vertices.map(|v| v.0.map(f64::from));
-            let cross = [
-                v[1][1] * v[2][2] - v[1][2] * v[2][1],
-                v[1][2] * v[2][0] - v[1][0] * v[2][2],
-                v[1][0] * v[2][1] - v[1][1] * v[2][0],
-            ];
-            volume += (v[0][0] * cross[0] + v[0][1] * cross[1] + v[0][2] * cross[2]) / 6.0;
-            for k in 0..3 {
-                let key = |at: usize| triangle.vertices[at].0.map(f32::to_bits);
-                *edges.entry((key(k), key((k + 1) % 3))).or_insert(0) += 1;
-                *edges.entry((key((k + 1) % 3), key(k))).or_insert(0) -= 1;
+    let mut scene = theatre();
+    scene.elevation = screen::ElevationMethod::Poisson;
+    let heights = screen::elevation(&scene).expect("an elevation");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.stl");
+    // In the middle of the screen and in its corner, where stitched cells have no neighbours.
+    for (c0, r0) in [(324, 149), (497, 247)] {
+        for (profile, seam) in [
+            (Profile::Bump, Seam::Step),
+            (Profile::Dish, Seam::Step),
+            (Profile::Bump, Seam::Stitched),
+            (Profile::Dish, Seam::Stitched),
+        ] {
+            (scene.microgeometry.profile, scene.microgeometry.seam) = (profile, seam);
+            let core = CellRange { c0, r0, c1: c0 + 3, r1: r0 + 3 };
+            let design = screen::design(&scene, Some(core), Some(&heights), &|_, _| ()).expect("a design");
+            design.write_stl(&path).expect("written");
+            let triangles = triangles(&path);
+            let mut edges = std::collections::BTreeMap::new();
+            let mut volume = 0.0;
+            let base = triangles.iter().flatten().map(|v| v[2]).fold(f32::INFINITY, f32::min);
+            let (mut worst, mut covered) = (0.0f64, 0.0);
+            for triangle in &triangles {
+                for k in 0..3 {
+                    let key = |at: usize| triangle[at].map(f32::to_bits);
+                    *edges.entry((key(k), key((k + 1) % 3))).or_insert(0) += 1;
+                }
+                let [a, b, c] = triangle.map(|v| v.map(f64::from));
+                let up = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+                let middle = [0, 1, 2].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
+                volume += up * (middle[2] - f64::from(base));
+                if up > 0.0 {
+                    covered += up;
+                    worst = worst.max((surface(&design, [middle[0], middle[1]]) - middle[2]).abs());
+                } else {
+                    assert!(triangle.iter().any(|v| v[2] == base), "an upper side that looks down");
+                }
             }
+            let name = format!("{profile:?} {seam:?} at {c0} {r0}");
+            let opposite = |(from, to): &(_, _)| edges.get(&(*to, *from)) == Some(&1);
+            let open = edges.iter().filter(|(edge, count)| **count != 1 || !opposite(edge)).count();
+            assert_eq!(open, 0, "{name}: edges that do not have two triangles, one each way");
+            assert!((covered - 144.0).abs() < 1e-6, "{name}: {covered} mm2");
+            // Heights of up to 0.2 m in single precision.
+            let highest = triangles.iter().flatten().map(|v| v[2].abs()).fold(1.0, f32::max);
+            assert!(worst <= f64::from(f32::EPSILON * highest), "{name}: {worst} mm off the design");
+            // With steps the mean height of a cell is its elevation; stitching lifts or lowers it.
+            let level = design.core_cells().map(|cell| 16.0 * (cell.elevation_mm - f64::from(base)));
+            let level = level.sum::<f64>();
+            let off = (volume - level) / 144.0;
+            let sign = if profile == Profile::Bump { 1.0 } else { -1.0 };
+            assert!(
+                if seam == Seam::Step { off.abs() < 1e-5 } else { (0.0..0.02).contains(&(sign * off)) },
+                "{name}: {off} mm"
+            );
         }
-        assert!(edges.values().all(|&count| count == 0), "every edge has its opposite");
-        // Mean height is the elevation: 2 mm over 16 mm2.
-        assert!((volume - 32.0).abs() < 1e-3, "{volume}");
     }
+}
+
+/// The surface by the container's definition.
+fn surface(design: &Design, p: [f64; 2]) -> f64 {
+    let core = design.core;
+    let index = |axis: usize, first: i32| first + (p[axis] / design.cell_mm).floor() as i32;
+    let (column, row) = (index(0, core.c0), index(1, core.r0));
+    let reach = i32::from(design.seam == Seam::Stitched);
+    let mut z: Option<f64> = None;
+    for (r, c) in
+        (row - reach..=row + reach).flat_map(|r| (column - reach..=column + reach).map(move |c| (r, c)))
+    {
+        if let Some(cell) = design.cell(c, r) {
+            let centre = design.centre_mm(cell);
+            let own = cell.height_mm([p[0] - centre[0], p[1] - centre[1]], design.profile);
+            z = Some(
+                z.map_or(own, |z| if design.profile == Profile::Bump { z.max(own) } else { z.min(own) }),
+            );
+        }
+    }
+    z.expect("a cell there")
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use screenmill::progress::Progress;
 use screenmill::screen::{
-    self, CellRange, Design, DesignWriter, Elevation, Frame, Profile, Scene, Seam, SolidError,
+    self, CellRange, DesignWriter, Elevation, Frame, Profile, Scene, Seam, SolidWriter,
 };
 use serde_json::json;
 
@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Where the designed cells go
     #[arg(long, value_name = "FILE.npz")]
     out: PathBuf,
-    /// Also write closed solids, one a cell, for step seams
+    /// Also write what the cells are as a mesh: a closed solid for each cell, or one if they are stitched
     #[arg(long, value_name = "FILE.stl")]
     stl: Option<PathBuf>,
     /// Cells C0 <= column < C1, R0 <= row < R1; all if left out
@@ -41,6 +41,8 @@ enum Unwritable {
     Folder { path: String },
     #[error("{path} cannot be written: {source}; hint: its folder must exist and be writable")]
     Parent { path: String, source: std::io::Error },
+    #[error("{path} is asked for twice; hint: --out and --stl take a file each")]
+    Twice { path: String },
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
@@ -49,8 +51,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     writable(&arguments.out)?;
     if let Some(stl) = &arguments.stl {
         writable(stl)?;
-        if scene.microgeometry.seam == Seam::Stitched {
-            return Err(SolidError::Stitched.into());
+        if *stl == arguments.out {
+            return Err(Unwritable::Twice { path: stl.display().to_string() }.into());
         }
     }
     let cells = arguments.cells.as_ref().map(|c| CellRange { c0: c[0], r0: c[1], c1: c[2], r1: c[3] });
@@ -59,16 +61,19 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let mut made = Made::new(frame);
     let watch = Watch::new(common.quiet, frame.extent.columns() * frame.extent.rows());
     let mut writer = DesignWriter::create(&arguments.out, &frame)?;
+    let mut solids = arguments.stl.as_ref().map(|stl| SolidWriter::create(stl, &frame)).transpose()?;
     screen::design_streamed::<Refusal>(&scene, &frame, elevation.as_ref(), &watch, &mut |cell| {
         made.count(&cell);
+        if let Some(solids) = &mut solids {
+            solids.push(&cell)?;
+        }
         Ok(writer.push(&cell)?)
     })?;
     watch.begin("writing", 0);
-    writer.finish()?;
-    if let Some(stl) = &arguments.stl {
-        watch.begin("solids", 0);
-        Design::read(&arguments.out)?.write_stl(stl)?;
+    if let Some(solids) = solids {
+        solids.finish()?;
     }
+    writer.finish()?;
     let times = watch.times();
     if common.verbose {
         for (stage, time) in times {

@@ -24,7 +24,7 @@ pub(super) fn beside(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     builder.prefix(".screenmill-").tempfile_in(folder(path))
 }
 
-fn folder(path: &Path) -> &Path {
+pub(super) fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

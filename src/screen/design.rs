@@ -51,6 +51,16 @@ pub enum Profile {
     Dish,
 }
 
+impl Profile {
+    /// 1 for bumps; -1 for dishes, which are bumps upside down.
+    pub fn sign(self) -> f64 {
+        match self {
+            Profile::Bump => 1.0,
+            Profile::Dish => -1.0,
+        }
+    }
+}
+
 /// Vertical steps between cells (paper), or cells extended until they meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -138,10 +148,7 @@ impl Cell {
     /// The same over another rectangle, in mm from the cell's centre, with the planes extended.
     pub fn polygons_within(&self, low: [f64; 2], high: [f64; 2], profile: Profile) -> Vec<FacetPolygon> {
         // The highest plane is the lowest of the planes turned upside down.
-        let sign = match profile {
-            Profile::Bump => 1.0,
-            Profile::Dish => -1.0,
-        };
+        let sign = profile.sign();
         let list = |of: fn(&Facet) -> f64| -> Vec<f64> { self.facets.iter().map(|f| sign * of(f)).collect() };
         let (gx, gy, c) = (list(|f| f.gradient[0]), list(|f| f.gradient[1]), list(|f| f.offset_mm));
         let mut diagram = Diagram::default();

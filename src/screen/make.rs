@@ -3,9 +3,7 @@ use rayon::prelude::*;
 use super::elevation::{Elevation, elevation};
 use super::facets::Wanted;
 use super::microgeometry::{Workspace, solve};
-use super::{
-    Cell, CellRange, Design, Error, Facet, Frame, Grazing, Profile, Scene, Seam, directions, facets,
-};
+use super::{Cell, CellRange, Design, Error, Facet, Frame, Grazing, Scene, Seam, directions, facets};
 use crate::progress::{Progress, Silent};
 
 /// Bytes that a facet of a design takes.
@@ -193,10 +191,7 @@ fn cell(
             tolerance,
         })?;
     // A dish is the bump turned half a turn and upside down: the same gradients and areas.
-    let sign = match microgeometry.profile {
-        Profile::Bump => 1.0,
-        Profile::Dish => -1.0,
-    };
+    let sign = microgeometry.profile.sign();
     let facets = (0..solved.gradients.len())
         .map(|k| Facet {
             gradient: solved.gradients[k],

@@ -1,170 +1,312 @@
 //! Designed cells as closed solids for CAD and mesh tools.
 
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
 
-use stl_io::{Normal, Triangle, Vertex};
+use rayon::prelude::*;
 
-use super::container::beside;
-use super::{Cell, Design, Seam};
+use super::container::{beside, folder};
+use super::pieces::Planes;
+use super::power::Diagram;
+use super::top::{Sketch, Square, Top};
+use super::{Cell, Design, Frame, Seam};
 
-/// Corners closer than this are one, in mm: facets that meet compute their corner apart.
-const WELD_MM: f64 = 1e-7;
 /// Metal under the lowest point, in mm.
 const BASE_MM: f64 = 1.0;
+/// Bytes of a binary STL before its triangles.
+const HEADER: usize = 84;
 
 /// Why a solid was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum SolidError {
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
-    #[error("a stitched design is not written as .stl; hint: seam = \"step\", or screenmill raster")]
-    Stitched,
     #[error(
-        "{triangles} triangles do not fit into an .stl, which counts to {most}; hint: fewer cells with --cells"
+        "{triangles} triangles and more do not fit into an .stl, which counts to {most}; hint: fewer cells with --cells"
     )]
     TooMany { triangles: u64, most: u64 },
-    #[error(
-        "cell ({column}, {row}): {edges} edges of its solid stay open; hint: facets of nearly equal gradients do this, try fewer"
-    )]
-    Open { column: i32, row: i32, edges: usize },
+    #[error("cell ({column}, {row}) has no facets that a mesh can hold; hint: wider cells or fewer facets")]
+    NoMesh { column: i32, row: i32 },
+}
+
+/// Writes the core of a design as a binary STL in mm, cell by cell: with vertical steps one closed
+/// solid a cell, stitched one closed solid for all. Walls are vertical, the base stands 1 mm under the
+/// lowest point, the frame is the part's, z that of the design. What is kept in memory is the rows
+/// of cells that a row needs; the outline waits on disk for the base, which is known at the end.
+pub struct SolidWriter {
+    frame: Frame,
+    path: PathBuf,
+    out: BufWriter<tempfile::NamedTempFile>,
+    triangles: u64,
+    /// Complete rows of cells, the lowest first, and the row that is coming in.
+    rows: VecDeque<Vec<Cell>>,
+    coming: Vec<Cell>,
+    /// Upper sides of the row of squares below, if stitched.
+    below: Vec<Vec<[f32; 3]>>,
+    outlines: BufWriter<File>,
+    lowest: f32,
+}
+
+/// What of a square's outline is a wall, side by side from the bottom counter-clockwise.
+struct Outline {
+    sides: [Vec<[f32; 3]>; 4],
+    wall: [bool; 4],
 }
 
 impl Design {
-    /// Writes the core's cells as a binary STL in mm: one closed solid a cell with vertical walls
-    /// and a common base 1 mm under the lowest point. The frame is the part's, z that of the design.
-    /// Nothing is left under `path` if that fails.
+    /// Writes the core's cells as a binary STL: see [`SolidWriter`]. Nothing is left under `path` if that fails.
     pub fn write_stl(&self, path: &Path) -> Result<(), SolidError> {
+        let mut writer = SolidWriter::create(path, &self.frame())?;
+        for cell in &self.cells {
+            writer.push(cell)?;
+        }
+        writer.finish()
+    }
+}
+
+impl SolidWriter {
+    /// Begins a solid. Nothing stands under `path` until [`SolidWriter::finish`].
+    pub fn create(path: &Path, frame: &Frame) -> Result<SolidWriter, SolidError> {
         let io = |source| SolidError::Io { path: path.display().to_string(), source };
-        if self.seam == Seam::Stitched {
-            return Err(SolidError::Stitched);
+        let mut out = BufWriter::with_capacity(1 << 18, beside(path).map_err(io)?);
+        out.write_all(&[0; HEADER]).map_err(io)?;
+        let outlines = tempfile::tempfile_in(folder(path)).map_err(io)?;
+        Ok(SolidWriter {
+            frame: *frame,
+            path: path.to_path_buf(),
+            out,
+            triangles: 0,
+            rows: VecDeque::new(),
+            coming: Vec::new(),
+            below: Vec::new(),
+            outlines: BufWriter::with_capacity(1 << 18, outlines),
+            lowest: f32::INFINITY,
+        })
+    }
+
+    /// Appends the next cell, by row, then column, the ring of a stitched design included.
+    pub fn push(&mut self, cell: &Cell) -> Result<(), SolidError> {
+        self.coming.push(cell.clone());
+        if self.coming.len() < self.frame.extent.columns() {
+            return Ok(());
         }
-        let lows = self.core_cells().map(|cell| cell.extremes_mm(self.cell_mm, self.profile)[0]);
-        let base = lows.fold(f64::INFINITY, f64::min) - BASE_MM;
-        let mut triangles = 0;
-        for cell in self.core_cells() {
-            triangles += self.solid(cell, base)?.len() as u64;
+        let row = std::mem::take(&mut self.coming);
+        self.rows.push_back(row);
+        let ready = if self.frame.seam == Seam::Step { self.rows.len() } else { self.rows.len() - 1 };
+        if ready > 0 {
+            self.write_row(ready - 1)?;
+            if ready > 1 || self.frame.seam == Seam::Step {
+                self.rows.pop_front();
+            }
         }
-        if triangles > u64::from(u32::MAX) {
-            return Err(SolidError::TooMany { triangles, most: u64::from(u32::MAX) });
-        }
-        let file = beside(path).map_err(io)?;
-        let mut buffer = BufWriter::new(file);
-        self.write_triangles(&mut buffer, triangles as u32, base)?.map_err(io)?;
-        let file = buffer.into_inner().map_err(|e| io(e.into_error()))?;
-        file.persist(path).map_err(|e| io(e.error))?;
         Ok(())
     }
 
-    /// Cell by cell, since a whole screen's triangles need not be in memory at once.
-    fn write_triangles(
-        &self,
-        writer: &mut impl Write,
-        count: u32,
-        base: f64,
-    ) -> Result<std::io::Result<()>, SolidError> {
-        let mut header = [0; 84];
-        header[80..].copy_from_slice(&count.to_le_bytes());
-        if let Err(error) = writer.write_all(&header) {
-            return Ok(Err(error));
+    /// Puts the file under its name.
+    pub fn finish(mut self) -> Result<(), SolidError> {
+        if self.frame.seam == Seam::Stitched && !self.rows.is_empty() {
+            self.write_row(self.rows.len() - 1)?;
         }
-        for cell in self.core_cells() {
-            for triangle in self.solid(cell, base)? {
-                let numbers = triangle.normal.0.into_iter().chain(triangle.vertices.iter().flat_map(|v| v.0));
-                let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).chain([0, 0]).collect();
-                if let Err(error) = writer.write_all(&bytes) {
-                    return Ok(Err(error));
+        let path = self.path.clone();
+        let io = |source| SolidError::Io { path: path.display().to_string(), source };
+        let base = (f64::from(self.lowest) - BASE_MM) as f32;
+        let SolidWriter { mut out, outlines, mut triangles, .. } = self;
+        let mut outlines = outlines.into_inner().map_err(|e| io(e.into_error()))?;
+        outlines.rewind().map_err(io)?;
+        let mut outlines = BufReader::with_capacity(1 << 18, outlines);
+        while let Some(outline) = Outline::read(&mut outlines).map_err(io)? {
+            for triangle in outline.walls(base) {
+                put(&mut out, triangle).map_err(io)?;
+                triangles += 1;
+            }
+        }
+        let most = u64::from(u32::MAX);
+        let count = u32::try_from(triangles).map_err(|_| SolidError::TooMany { triangles, most })?;
+        out.seek(SeekFrom::Start(HEADER as u64 - 4)).map_err(io)?;
+        out.write_all(&count.to_le_bytes()).map_err(io)?;
+        let file = out.into_inner().map_err(|e| io(e.into_error()))?;
+        file.persist(&path).map_err(|e| io(e.error))?;
+        Ok(())
+    }
+
+    /// Writes the tops of one row of squares, if it belongs to the core.
+    fn write_row(&mut self, at: usize) -> Result<(), SolidError> {
+        let Frame { core, seam, .. } = self.frame;
+        let Some(row) = self.rows[at].first().map(|cell| cell.row) else { return Ok(()) };
+        if !(core.r0..core.r1).contains(&row) {
+            return Ok(());
+        }
+        let columns: Vec<i32> = (core.c0..core.c1).collect();
+        let near = Near { rows: &self.rows, frame: &self.frame };
+        let sketches: Vec<Sketch> = columns
+            .par_iter()
+            .map_init(Diagram::default, |diagram, &column| near.sketch(diagram, column, row))
+            .collect();
+        let stitched = seam == Seam::Stitched;
+        let tops: Vec<Option<(Top, Outline)>> = sketches
+            .par_iter()
+            .enumerate()
+            .map(|(k, sketch)| {
+                let mut sides = sketch.sides.each_ref().map(Vec::as_slice);
+                if stitched && k > 0 {
+                    sides[3] = &sketches[k - 1].sides[1];
                 }
-            }
-        }
-        Ok(Ok(()))
-    }
-
-    /// The closed solid of one cell over a base, in the part's frame.
-    pub fn solid(&self, cell: &Cell, base_mm: f64) -> Result<Vec<Triangle>, SolidError> {
-        let mut corners: Vec<[f64; 3]> = Vec::new();
-        let mut rings: Vec<Vec<usize>> = Vec::new();
-        for polygon in cell.polygons(self.cell_mm, self.profile) {
-            let facet = &cell.facets[polygon.facet];
-            let start = corners.len();
-            corners.extend(polygon.vertices_mm.iter().map(|&v| [v[0], v[1], facet.height_mm(v)]));
-            rings.push((start..corners.len()).collect());
-        }
-        let same = weld(&corners);
-        for ring in &mut rings {
-            ring.iter_mut().for_each(|corner| *corner = same[*corner]);
-            ring.dedup();
-            if ring.first() == ring.last() {
-                ring.pop();
-            }
-        }
-        rings.retain(|ring| ring.len() > 2);
-        let border = border(&rings);
-        let half = 0.5 * self.cell_mm;
-        let on_side = |corner: usize, axis: usize| {
-            let at = corners[corner][axis];
-            (at.abs() - half).abs() < 10.0 * WELD_MM
-        };
-        let inner = border.iter().filter(|(a, b)| {
-            !(0..2).any(|axis| {
-                on_side(*a, axis) && (corners[*a][axis] - corners[*b][axis]).abs() < 20.0 * WELD_MM
+                if stitched && row > core.r0 {
+                    sides[0] = &self.below[k];
+                }
+                let top = sketch.triangulated(&sides)?;
+                let column = columns[k];
+                let wall = if stitched {
+                    [row == core.r0, column + 1 == core.c1, row + 1 == core.r1, column == core.c0]
+                } else {
+                    [true; 4]
+                };
+                Some((top, Outline { sides: sides.map(<[_]>::to_vec), wall }))
             })
-        });
-        let open = inner.count();
-        if open > 0 {
-            return Err(SolidError::Open { column: cell.column, row: cell.row, edges: open });
+            .collect();
+        let io = |source| SolidError::Io { path: self.path.display().to_string(), source };
+        for (top, column) in tops.into_iter().zip(columns) {
+            let (top, outline) = top.ok_or(SolidError::NoMesh { column, row })?;
+            for corners in &top.triangles {
+                put(&mut self.out, corners.map(|at| top.points[at as usize])).map_err(io)?;
+            }
+            self.triangles += top.triangles.len() as u64;
+            self.lowest = top.points.iter().fold(self.lowest, |low, point| low.min(point[2]));
+            outline.write(&mut self.outlines).map_err(io)?;
         }
-        let [x, y] = self.centre_mm(cell);
-        let top = |corner: usize| {
-            let v = corners[corner];
-            [v[0] + x, v[1] + y, v[2] + cell.elevation_mm]
-        };
-        let bottom = |corner: usize| [corners[corner][0] + x, corners[corner][1] + y, base_mm];
-        let mut solid = Vec::new();
-        for ring in &rings {
-            for k in 2..ring.len() {
-                solid.push(triangle([top(ring[0]), top(ring[k - 1]), top(ring[k])]));
+        let most = u64::from(u32::MAX);
+        if self.triangles > most {
+            return Err(SolidError::TooMany { triangles: self.triangles, most });
+        }
+        if stitched {
+            self.below = sketches
+                .into_iter()
+                .map(|sketch| sketch.sides.into_iter().nth(2).unwrap_or_default())
+                .collect();
+        }
+        Ok(())
+    }
+}
+
+/// The rows of cells that are at hand.
+struct Near<'a> {
+    rows: &'a VecDeque<Vec<Cell>>,
+    frame: &'a Frame,
+}
+
+impl Near<'_> {
+    fn cell(&self, column: i32, row: i32) -> Option<&Cell> {
+        let first = self.rows.front()?.first()?;
+        let at = usize::try_from(row - first.row).ok()?;
+        self.rows.get(at)?.get(usize::try_from(column - first.column).ok()?)
+    }
+
+    fn sketch(&self, diagram: &mut Diagram, column: i32, row: i32) -> Sketch {
+        let Frame { core, cell_mm, profile, seam, .. } = *self.frame;
+        let reach = i32::from(seam == Seam::Stitched);
+        let datum_mm = self.cell(column, row).map_or(0.0, |cell| cell.elevation_mm);
+        let mut planes = Vec::new();
+        // The square's own cell first, then those around it.
+        let around = (-reach..=reach).flat_map(|dr| (-reach..=reach).map(move |dc| (dc, dr)));
+        for (dc, dr) in std::iter::once((0, 0)).chain(around.filter(|&offset| offset != (0, 0))) {
+            if let Some(cell) = self.cell(column + dc, row + dr) {
+                let from = [f64::from(dc) * cell_mm, f64::from(dr) * cell_mm];
+                planes.push(Planes::of(cell, profile, from, datum_mm));
             }
         }
-        for &(a, b) in &border {
-            solid.push(triangle([bottom(a), bottom(b), top(b)]));
-            solid.push(triangle([bottom(a), top(b), top(a)]));
-            solid.push(triangle([[x, y, base_mm], bottom(b), bottom(a)]));
+        let edge = |at: i32, from: i32| f64::from(at - from) * cell_mm;
+        let square = Square {
+            low: [edge(column, core.c0), edge(row, core.r0)],
+            high: [edge(column + 1, core.c0), edge(row + 1, core.r0)],
+            datum_mm,
+            sign: profile.sign(),
+        };
+        let corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(right, up)| {
+            let own = reach == 0;
+            let cells = [(-1, -1), (0, -1), (-1, 0), (0, 0)].map(|(dc, dr)| {
+                let at = (column + right + dc, row + up + dr);
+                (!own || at == (column, row)).then(|| self.cell(at.0, at.1)).flatten().map(|cell| {
+                    // Seen from the cell, the corner is on its right if the cell is on the corner's left.
+                    let p = [-0.5 - f64::from(dc), -0.5 - f64::from(dr)].map(|share| share * cell_mm);
+                    square.sign * cell.height_mm(p, profile)
+                })
+            });
+            (square.sign * cells.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max)) as f32
+        });
+        Sketch::new(diagram, &planes, &square, corners)
+    }
+}
+
+impl Outline {
+    fn write(&self, out: &mut impl Write) -> std::io::Result<()> {
+        for (points, wall) in self.sides.iter().zip(self.wall) {
+            out.write_all(&[u8::from(wall)])?;
+            let ends = [points[0], points[points.len() - 1]];
+            // No wall, no points between: the base has the corners only.
+            let points = if wall { points.as_slice() } else { &ends };
+            out.write_all(&(points.len() as u32).to_le_bytes())?;
+            for number in points.iter().flatten() {
+                out.write_all(&number.to_le_bytes())?;
+            }
         }
-        Ok(solid)
+        Ok(())
     }
-}
 
-/// For every corner the first one that it coincides with.
-fn weld(corners: &[[f64; 3]]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..corners.len()).collect();
-    order.sort_by(|&a, &b| corners[a][0].total_cmp(&corners[b][0]).then(a.cmp(&b)));
-    let mut same: Vec<usize> = (0..corners.len()).collect();
-    for (at, &corner) in order.iter().enumerate() {
-        let near = order[..at].iter().rev().take_while(|&&b| corners[corner][0] - corners[b][0] <= WELD_MM);
-        let first = near.copied().find(|&b| (corners[corner][1] - corners[b][1]).abs() <= WELD_MM);
-        if let Some(first) = first {
-            same[corner] = same[first];
+    /// The next outline, or None at the end.
+    fn read(from: &mut impl Read) -> std::io::Result<Option<Outline>> {
+        let mut outline = Outline { sides: Default::default(), wall: [false; 4] };
+        for side in 0..4 {
+            let mut head = [0; 1];
+            if side == 0 && from.read(&mut head)? == 0 {
+                return Ok(None);
+            } else if side > 0 {
+                from.read_exact(&mut head)?;
+            }
+            outline.wall[side] = head[0] == 1;
+            let mut number = [0; 4];
+            from.read_exact(&mut number)?;
+            for _ in 0..u32::from_le_bytes(number) {
+                let mut point = [0.0; 3];
+                for value in &mut point {
+                    from.read_exact(&mut number)?;
+                    *value = f32::from_le_bytes(number);
+                }
+                outline.sides[side].push(point);
+            }
         }
+        Ok(Some(outline))
     }
-    same
+
+    /// Walls and base over the height `base`, facing outward.
+    fn walls(&self, base: f32) -> Vec<[[f32; 3]; 3]> {
+        let (low, high) = (self.sides[0][0], self.sides[1][self.sides[1].len() - 1]);
+        let centre = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), base];
+        let foot = |p: [f32; 3]| [p[0], p[1], base];
+        let mut triangles = Vec::new();
+        for (side, points) in self.sides.iter().enumerate() {
+            for pair in points.windows(2) {
+                // Counter-clockwise: bottom and right rise, top and left fall.
+                let [a, b] = if side < 2 { [pair[0], pair[1]] } else { [pair[1], pair[0]] };
+                if self.wall[side] {
+                    triangles.push([foot(a), foot(b), b]);
+                    triangles.push([foot(a), b, a]);
+                }
+                triangles.push([centre, foot(b), foot(a)]);
+            }
+        }
+        triangles
+    }
 }
 
-/// The directed edges whose opposite is missing.
-fn border(rings: &[Vec<usize>]) -> Vec<(usize, usize)> {
-    let edges = |ring: &Vec<usize>| -> Vec<(usize, usize)> {
-        (0..ring.len()).map(|k| (ring[k], ring[(k + 1) % ring.len()])).collect()
-    };
-    let mut all: Vec<(usize, usize)> = rings.iter().flat_map(edges).collect();
-    all.sort_unstable();
-    all.iter().copied().filter(|&(a, b)| all.binary_search(&(b, a)).is_err()).collect()
-}
-
-fn triangle(corners: [[f64; 3]; 3]) -> Triangle {
-    let [a, b, c] = corners.map(glam::DVec3::from_array);
-    let normal = (b - a).cross(c - a).normalize_or_zero();
-    Triangle {
-        normal: Normal::new(normal.as_vec3().to_array()),
-        vertices: corners.map(|v| Vertex::new(v.map(|z| z as f32))),
+fn put(out: &mut impl Write, corners: [[f32; 3]; 3]) -> std::io::Result<()> {
+    let [a, b, c] = corners.map(|corner| glam::DVec3::from_array(corner.map(f64::from)));
+    let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3().to_array();
+    let mut bytes = [0; 50];
+    let numbers = normal.into_iter().chain(corners.into_iter().flatten());
+    for (place, number) in bytes.chunks_exact_mut(4).zip(numbers) {
+        place.copy_from_slice(&number.to_le_bytes());
     }
+    out.write_all(&bytes)
 }

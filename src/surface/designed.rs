@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::envelope::{Piece, Plane, Planes, Rect, along_row, clip_to};
 use super::{Error, Level, Surface, columns_mm, covering, mirrored_columns_mm, reversed};
 use crate::grid::{Heights, Lattice, Window};
-use crate::screen::{CellRange, Design, Profile, Seam};
+use crate::screen::{CellRange, Design, Seam};
 
 /// Rows that share one choice of planes. Strips are counted from row 0 of the part, so that a
 /// sample sees the same planes whatever window asked for it.
@@ -76,7 +76,7 @@ impl Designed {
         let ring = i32::from(stitched);
         let carried = CellRange { c0: c0 - ring, r0: r0 - ring, c1: c1 + ring, r1: r1 + ring };
         let mut designed = Designed {
-            sign: if design.profile == Profile::Bump { 1.0 } else { -1.0 },
+            sign: design.profile.sign(),
             design,
             material,
             origin_mm,

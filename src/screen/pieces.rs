@@ -1,0 +1,198 @@
+//! What each facet owns of a cell's square, where neighbours' planes reach into it too.
+
+use super::power::{Diagram, SIDES, Vertex, area, clip};
+use super::{Cell, Profile};
+
+/// Pieces below this area, in mm2, are rounding.
+const NOTHING_MM2: f64 = 1e-15;
+/// Label of an edge that a neighbour's plane cuts.
+const CUT: u32 = SIDES[0] - 1;
+
+/// One cell's planes as a bump, p in mm from the centre of a square that may be another cell's:
+/// dishes are upside down.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Planes {
+    pub gx: Vec<f64>,
+    pub gy: Vec<f64>,
+    pub c: Vec<f64>,
+    /// Index of each among the cell's facets.
+    pub facet: Vec<usize>,
+}
+
+/// A convex part of a facet that is on the surface.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Piece {
+    /// Index of the cell among those given.
+    pub cell: usize,
+    /// Index into the planes of that cell as they were given.
+    pub plane: usize,
+    /// Corners, counter-clockwise.
+    pub outline: Vec<[f64; 2]>,
+}
+
+impl Planes {
+    /// Of a cell whose centre stands at `from` as seen from the square's; heights over `datum_mm`.
+    pub fn of(cell: &Cell, profile: Profile, from: [f64; 2], datum_mm: f64) -> Planes {
+        let sign = profile.sign();
+        let mut planes = Planes::default();
+        for (facet, f) in cell.facets.iter().enumerate() {
+            let g = f.gradient.map(|g| sign * g);
+            let c = sign * (f.offset_mm + (cell.elevation_mm - datum_mm));
+            planes.gx.push(g[0]);
+            planes.gy.push(g[1]);
+            planes.c.push(c - (g[0] * from[0] + g[1] * from[1]));
+            planes.facet.push(facet);
+        }
+        planes
+    }
+
+    pub fn at(&self, plane: usize, p: [f64; 2]) -> f64 {
+        self.gx[plane] * p[0] + self.gy[plane] * p[1] + self.c[plane]
+    }
+
+    fn len(&self) -> usize {
+        self.c.len()
+    }
+
+    /// Lowest and highest value of a plane in the square.
+    fn range(&self, plane: usize, half: f64) -> [f64; 2] {
+        let swing = half * (self.gx[plane].abs() + self.gy[plane].abs());
+        [self.c[plane] - swing, self.c[plane] + swing]
+    }
+
+    /// Only the planes that can be the lowest somewhere in the square, by their ranges, and what the
+    /// lowest plane of all cannot exceed there.
+    fn near(&self, half: f64) -> (Planes, f64) {
+        let ranges: Vec<[f64; 2]> = (0..self.len()).map(|k| self.range(k, half)).collect();
+        let ceiling = ranges.iter().map(|r| r[1]).fold(f64::INFINITY, f64::min);
+        let mut near = Planes::default();
+        for k in (0..self.len()).filter(|&k| ranges[k][0] <= ceiling) {
+            near.gx.push(self.gx[k]);
+            near.gy.push(self.gy[k]);
+            near.c.push(self.c[k]);
+            near.facet.push(self.facet[k]);
+        }
+        (near, ceiling)
+    }
+}
+
+/// The pieces of the square of side 2 `half` on which each plane of the cells is the surface, the
+/// highest of the cells' lowest planes: together they cover the square once. On ties the earlier
+/// cell wins.
+pub(super) fn pieces(diagram: &mut Diagram, cells: &[Planes], half: f64) -> Vec<Piece> {
+    let Some(own) = cells.first() else { return Vec::new() };
+    let corners = [[-half, -half], [half, -half], [half, half], [-half, half]];
+    // Concave, so lowest at a corner of the square.
+    let lowest = |planes: &Planes, p: [f64; 2]| {
+        (0..planes.len()).map(|k| planes.at(k, p)).fold(f64::INFINITY, f64::min)
+    };
+    let floor = corners.iter().map(|&p| lowest(own, p)).fold(f64::INFINITY, f64::min);
+    let functions: Vec<(usize, Function)> = cells
+        .iter()
+        .enumerate()
+        .filter_map(|(index, planes)| {
+            if index == 0 {
+                return Some((index, Function::new(diagram, planes, half)));
+            }
+            let (near, ceiling) = planes.near(half);
+            (ceiling > floor).then(|| (index, Function::new(diagram, &near, half)))
+        })
+        .collect();
+    let mut found = Vec::new();
+    let mut scratch = Scratch::default();
+    for (at, (cell, function)) in functions.iter().enumerate() {
+        for (plane, polygon) in function.polygons.iter().enumerate().filter(|(_, p)| p.len() > 2) {
+            let mut parts = vec![polygon.clone()];
+            for (other, (_, rival)) in functions.iter().enumerate() {
+                if other == at {
+                    continue;
+                }
+                let mut kept = Vec::new();
+                for part in parts {
+                    scratch.subtract(&part, function, plane, rival, other < at, &mut kept);
+                }
+                parts = kept;
+            }
+            found.extend(parts.into_iter().map(|part| Piece {
+                cell: *cell,
+                plane: function.planes.facet[plane],
+                outline: part.into_iter().map(|v| v.0).collect(),
+            }));
+        }
+    }
+    found
+}
+
+/// One cell's planes and what each has of the square while no other cell is looked at.
+struct Function {
+    planes: Planes,
+    polygons: Vec<Vec<Vertex>>,
+    /// Planes that have a polygon at all.
+    seen: Vec<usize>,
+}
+
+impl Function {
+    fn new(diagram: &mut Diagram, planes: &Planes, half: f64) -> Function {
+        diagram.forget();
+        diagram.compute(&planes.gx, &planes.gy, &planes.c, [-half; 2], [half; 2]);
+        let polygons: Vec<Vec<Vertex>> = (0..planes.len()).map(|k| diagram.polygon(k).to_vec()).collect();
+        let seen = (0..planes.len()).filter(|&k| polygons[k].len() > 2).collect();
+        Function { planes: planes.clone(), polygons, seen }
+    }
+}
+
+#[derive(Default)]
+struct Scratch {
+    cutting: Vec<usize>,
+    /// What the rival has of the polygon.
+    lost: Vec<Vertex>,
+    spare: Vec<Vertex>,
+}
+
+impl Scratch {
+    /// The parts of a polygon of `plane` in which it is not below the rival: the polygon less the convex
+    /// set in which every plane of the rival lies above it.
+    fn subtract(
+        &mut self,
+        polygon: &[Vertex],
+        function: &Function,
+        plane: usize,
+        rival: &Function,
+        rival_wins_ties: bool,
+        kept: &mut Vec<Vec<Vertex>>,
+    ) {
+        self.lost.clear();
+        self.cutting.clear();
+        let (own, planes) = (&function.planes, &rival.planes);
+        for &j in &rival.seen {
+            let (gx, gy, c) =
+                (planes.gx[j] - own.gx[plane], planes.gy[j] - own.gy[plane], planes.c[j] - own.c[plane]);
+            let (mut worst, mut best) = (f64::INFINITY, f64::NEG_INFINITY);
+            for &([x, y], _) in polygon {
+                let above = gx * x + gy * y + c;
+                (worst, best) = (worst.min(above), best.max(above));
+            }
+            if best < 0.0 || (best == 0.0 && !(worst == 0.0 && rival_wins_ties)) {
+                kept.push(polygon.to_vec());
+                return;
+            }
+            if worst < 0.0 {
+                self.cutting.push(j);
+            }
+        }
+        self.lost.extend_from_slice(polygon);
+        for &j in &self.cutting {
+            let normal = [planes.gx[j] - own.gx[plane], planes.gy[j] - own.gy[plane]];
+            let offset = own.c[plane] - planes.c[j];
+            let mut part = self.lost.clone();
+            clip(&mut part, &mut self.spare, normal, offset, CUT);
+            if area(&part) > NOTHING_MM2 {
+                kept.push(part);
+            }
+            clip(&mut self.lost, &mut self.spare, normal.map(|n| -n), -offset, CUT);
+            if self.lost.is_empty() {
+                break;
+            }
+        }
+    }
+}
