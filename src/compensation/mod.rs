@@ -25,6 +25,7 @@ mod field;
 mod interval;
 mod lanes;
 mod memory;
+mod meridian;
 mod pairs;
 mod passes;
 mod places;
@@ -34,6 +35,7 @@ mod slopes;
 mod stencil;
 mod stream;
 mod tiles;
+mod touch;
 mod unboxed;
 
 pub use drop::{Faces, lift};

@@ -6,7 +6,7 @@ const LARGEST_RADIUS_SAMPLES: f64 = 4096.0;
 
 /// A sample this close past the radius counts as at distance exactly R: positions are sums of
 /// decimal fractions, and one sample more under the cutter is never a gouge.
-const REACH_MM: f64 = 1e-9;
+pub(super) const REACH_MM: f64 = 1e-9;
 
 /// A cutter made ready for samples of one pitch, optionally dilated by a disc: with a lateral
 /// allowance a the cutter may stand anywhere within a of its planned position.
