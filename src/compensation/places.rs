@@ -44,13 +44,40 @@ impl<'a> Places<'a> {
         low..(block(mm + reach_mm) + 1.0).clamp(low as f64, count as f64) as usize
     }
 
-    /// A height that no sample in the square `reach_mm` around a place exceeds; -inf without data.
+    /// The highest sample up to `reach_mm` from a place; -inf where there is none.
     pub fn ceiling_mm(&self, place_mm: [f64; 2], reach_mm: f64) -> f64 {
+        let window = self.heights.window;
+        let origin = [window.column as f64 + 0.5, window.row as f64 + 0.5];
+        let at = |axis: usize, sample: usize| (origin[axis] + sample as f64) * self.step_mm - place_mm[axis];
+        // A sample at the reach itself counts whatever the last bit of its place.
+        let square = reach_mm * reach_mm * (1.0 + 1e-12);
         let columns = self.blocks(0, place_mm[0], reach_mm);
         let mut best = f32::NEG_INFINITY;
         for row in self.blocks(1, place_mm[1], reach_mm) {
-            let tops = &self.tops[row * self.columns..][columns.clone()];
-            best = tops.iter().fold(best, |best, &top| if top > best { top } else { best });
+            for column in columns.clone() {
+                let top = self.tops[row * self.columns + column];
+                let first = [column * SIDE, row * SIDE];
+                let end = [(first[0] + SIDE).min(window.columns), (first[1] + SIDE).min(window.rows)];
+                let near = |axis: usize| at(axis, first[axis]).max(-at(axis, end[axis] - 1)).max(0.0);
+                let far = |axis: usize| at(axis, end[axis] - 1).max(-at(axis, first[axis]));
+                let distance = |gap: &dyn Fn(usize) -> f64| gap(0).powi(2) + gap(1).powi(2);
+                if top <= best || distance(&near) > square {
+                    continue;
+                }
+                if distance(&far) <= square {
+                    best = top;
+                    continue;
+                }
+                for sample_row in first[1]..end[1] {
+                    let left = square - at(1, sample_row).powi(2);
+                    let z_mm = &self.heights.z_mm[sample_row * window.columns..][first[0]..end[0]];
+                    for (i, &z_mm) in z_mm.iter().enumerate() {
+                        if z_mm > best && z_mm.is_finite() && at(0, first[0] + i).powi(2) <= left {
+                            best = z_mm;
+                        }
+                    }
+                }
+            }
         }
         f64::from(best)
     }
@@ -137,6 +164,17 @@ mod tests {
                 let ceiling = places.ceiling_mm(place, profile.radius_mm());
                 assert!(all.is_nan() || ceiling >= all, "{ceiling} under {all}");
             }
+        }
+        for i in 0..400 {
+            let place = [-0.2 + 0.0023 * f64::from(i), 0.05 + 0.0017 * f64::from(i)];
+            let reach_mm = 0.0007 * f64::from(i);
+            let within = heights.z_mm.iter().enumerate().filter(|(k, z)| {
+                let (c, r) = ((k % window.columns) as i64, (k / window.columns) as i64);
+                let at = [window.column + c, window.row + r].map(|sample| 0.01 * (sample as f64 + 0.5));
+                z.is_finite() && (at[0] - place[0]).hypot(at[1] - place[1]) <= reach_mm
+            });
+            let highest = within.map(|(_, &z)| z).fold(f32::NEG_INFINITY, f32::max);
+            assert_eq!(places.ceiling_mm(place, reach_mm), f64::from(highest), "{place:?}, {reach_mm}");
         }
     }
 }

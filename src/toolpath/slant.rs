@@ -16,8 +16,12 @@ use crate::compensation::{Faces, Places};
 /// Positions of a pass whose surroundings are held at once.
 const BLOCK: usize = 512;
 
-/// Positions that share what is known of the heights around them.
+/// Most positions that share what is known of the heights around them.
 const GROUP: usize = 8;
+
+/// Length of such a group in parts of the cutter's radius: what lies that much farther counts as in reach, so that a
+/// small ball on a steep face would be lifted for it.
+const GROUP_RADII: f64 = 0.1;
 
 /// Passes that are planned together.
 const BAND: usize = 64;
@@ -89,10 +93,11 @@ impl Block<'_> {
             }
         }
         let mut wide: Option<(usize, f64)> = None;
-        for first in (from..to).step_by(GROUP) {
-            let end = (first + GROUP).min(to);
+        let group = ((GROUP_RADII * self.cutter.radius_mm / self.cutter.pitch_mm) as usize).clamp(1, GROUP);
+        for first in (from..to).step_by(group) {
+            let end = (first + group).min(to);
             let middle = self.layout.turned_mm(k, first.midpoint(end));
-            let around_mm = 0.5 * (GROUP + 1) as f64 * self.cutter.pitch_mm + self.cutter.strays_mm();
+            let around_mm = 0.5 * (group + 1) as f64 * self.cutter.pitch_mm + self.cutter.strays_mm();
             let mut ceilings = [None; RINGS.len()];
             for i in first..end {
                 let [left, right] = [i, i + 1].map(|i| f64::from(envelope.cl_mm[i]));
