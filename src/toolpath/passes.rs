@@ -130,8 +130,9 @@ impl Layout {
         let (origin_u, origin_v) = along.split(site.origin_mm.map(|o| (o / unit).round() as i64));
         let pitch = ((lattice.step_mm / unit + 1e-9).floor() as i64).max(1);
         let span = |origin: i64, length_mm: f64, overrun_mm: f64| {
-            let low = (-overrun_mm / unit).round() as i64 + origin;
-            (low, ((length_mm + overrun_mm) / unit).round() as i64 + origin)
+            // Outwards, so that passes of all grids end at the same positions.
+            let low = (-overrun_mm / unit + 1e-6).floor() as i64 + origin;
+            (low, ((length_mm + overrun_mm) / unit - 1e-6).ceil() as i64 + origin)
         };
         let counted =
             |step: i64, (low, high): (i64, i64)| (low.div_euclid(step), -((-high).div_euclid(step)));
