@@ -1,9 +1,13 @@
 //! The job file: what is cut, from what, on which machine, with which operations. Every key is checked
 //! when it is read; an unknown one is an error.
 
+mod operation;
+
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+
+pub use operation::{Face, Kind, Operation, Pattern, Place};
 
 use crate::settings::{self, Source};
 
@@ -217,42 +221,6 @@ pub struct Maps {
     pub full: bool,
 }
 
-/// One operation, cut with one tool in one program a tile.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Operation {
-    pub kind: Kind,
-    /// An entry of the tool library, or an inline cutter such as `ball:1`.
-    pub tool: String,
-    pub stepdown_mm: Option<f64>,
-    pub stepover_mm: Option<f64>,
-    pub scallop_mm: Option<f64>,
-    #[serde(default)]
-    pub stock_to_leave_mm: f64,
-    #[serde(default)]
-    pub direction_deg: f64,
-    #[serde(default)]
-    pub pattern: Pattern,
-    pub feed_mm_min: Option<f64>,
-    pub plunge_mm_min: Option<f64>,
-    pub spindle_rpm: Option<f64>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    Rough,
-    Finish,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Pattern {
-    #[default]
-    Zigzag,
-    OneWay,
-}
-
 /// Why a job was refused.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -306,6 +274,34 @@ impl Job {
         }
         for (index, operation) in self.operations.iter().enumerate() {
             operation.check(source, index)?;
+        }
+        self.check_order(source)
+    }
+
+    /// Refuses operations that a blank cannot take, and an underside that is cut after the top.
+    fn check_order(&self, source: &Source) -> Result<(), Error> {
+        let (mut top, mut finished) = (false, false);
+        for (index, operation) in self.operations.iter().enumerate() {
+            let problem = if self.stock.blanks == Blanks::One && operation.kind.beside() {
+                Some(("goes with blanks = \"per-tile\" only", "a tile of one sheet has no blank of its own"))
+            } else if operation.face == Face::Underside && top {
+                Some((
+                    "cuts the underside after the top has been cut",
+                    "put it before them: the blank would lie on its finished face",
+                ))
+            } else if operation.kind == Kind::Rest && !finished {
+                Some((
+                    "has no finish before it that leaves no stock",
+                    "it goes where the cutters before it could not reach",
+                ))
+            } else {
+                None
+            };
+            finished |= operation.finishes();
+            if let Some((problem, hint)) = problem {
+                return Err(operation.refusal(source, index, problem, hint));
+            }
+            top |= operation.kind.shapes() || operation.kind == Kind::CutOut;
         }
         Ok(())
     }
@@ -386,69 +382,5 @@ fn name_of(path: &Path) -> String {
     match full.parent().and_then(Path::file_name) {
         Some(folder) if stem == "job" => folder.to_string_lossy().into_owned(),
         _ => stem,
-    }
-}
-
-impl Kind {
-    /// The word of the job file.
-    pub fn word(self) -> &'static str {
-        match self {
-            Kind::Rough => "rough",
-            Kind::Finish => "finish",
-        }
-    }
-}
-
-impl Operation {
-    fn check(&self, source: &Source, index: usize) -> Result<(), Error> {
-        let ranges = [
-            ("stepdown_mm", self.stepdown_mm, 1e-3, 50.0),
-            ("stepover_mm", self.stepover_mm, 1e-3, 100.0),
-            ("scallop_mm", self.scallop_mm, 1e-6, 10.0),
-            ("stock_to_leave_mm", Some(self.stock_to_leave_mm), 0.0, 10.0),
-            ("direction_deg", Some(self.direction_deg), -360.0, 360.0),
-            ("feed_mm_min", self.feed_mm_min, 1.0, 60_000.0),
-            ("plunge_mm_min", self.plunge_mm_min, 1.0, 60_000.0),
-            ("spindle_rpm", self.spindle_rpm, 1.0, 200_000.0),
-        ];
-        for (key, value, low, high) in ranges {
-            if let Some(value) = value {
-                source.within(&format!("operation[{index}].{key}"), value, low, high)?;
-            }
-        }
-        let stepover = self.stepover_mm.is_some();
-        let problem = match self.kind {
-            Kind::Rough if self.stepdown_mm.is_none() => {
-                Some(("has no stepdown_mm", "0.05 to 0.15 of the cutter's diameter"))
-            }
-            Kind::Rough if self.scallop_mm.is_some() => {
-                Some(("has scallop_mm", "roughing takes stepover_mm"))
-            }
-            Kind::Rough if self.pattern == Pattern::OneWay => {
-                Some(("has pattern = \"one-way\"", "roughing is zigzag; leave pattern out"))
-            }
-            Kind::Finish if self.stepdown_mm.is_some() => Some((
-                "has stepdown_mm",
-                "finishing is one pass over the surface; a rough operation has levels",
-            )),
-            Kind::Finish if stepover && self.scallop_mm.is_some() => {
-                Some(("has stepover_mm and scallop_mm", "name one of them"))
-            }
-            Kind::Finish if !stepover && self.scallop_mm.is_none() => {
-                Some(("has no stepover_mm or scallop_mm", "name one of them"))
-            }
-            _ => None,
-        };
-        match problem {
-            Some((problem, hint)) => Err(Error::Operation {
-                path: source.path().into(),
-                line: source.line_of(&format!("operation[{index}].kind")),
-                number: index + 1,
-                kind: self.kind.word(),
-                problem,
-                hint,
-            }),
-            None => Ok(()),
-        }
     }
 }

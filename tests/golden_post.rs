@@ -54,6 +54,7 @@ fn written(dialect: &str, machine: &str, library: &str, z_zero: ZZero) -> String
         section: None,
         tool: &tool,
         stock: &stock,
+        spindle: true,
         z_zero,
         wcs: "G54",
         clearance_mm: 5.0,

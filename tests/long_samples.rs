@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-const SAMPLES: [(&str, &str); 7] = [
+const SAMPLES: [(&str, &str); 8] = [
     ("quickstart", "0.02"),
     ("theatre-prototype", "0.1"),
     ("theatre-dish", "0.1"),
@@ -15,6 +15,7 @@ const SAMPLES: [(&str, &str); 7] = [
     ("split", "0.1"),
     ("stl", "0.02"),
     ("relief", "0.02"),
+    ("die", "0.02"),
 ];
 
 fn root() -> &'static Path {

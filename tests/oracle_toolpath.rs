@@ -203,7 +203,7 @@ fn climbing_passes_run_with_the_uncut_material_on_their_right() {
 
 #[test]
 fn scallop_height_is_kept_on_the_steepest_face() {
-    for (slope, direction_deg) in [(0.0, 0.0), (0.5, 0.0), (0.0, 45.0)] {
+    for (slope, direction_deg) in [(0.0, 0.0), (0.5, 0.0), (0.0, 45.0), (0.5, 33.0), (0.5, 150.0)] {
         let relief = Relief::new([0.6, 0.6], STEP, [0.0, slope], |_, y| -slope * y);
         let site = site(&relief, 0.0001, 0.0);
         let spacing = Spacing::ScallopMm(0.001);
@@ -227,6 +227,7 @@ fn rough_params(cutter: &str) -> rough::Params {
         stepover_mm: None,
         stock_to_leave_mm: 0.05,
         direction_deg: 0.0,
+        pattern: Pattern::Zigzag,
         clear_mm: 0.3,
     }
 }
@@ -250,6 +251,33 @@ fn roughing_bites_no_deeper_than_its_stepdown_and_leaves_what_it_should() {
             assert!(least >= 0.05 - GOUGE - FLOAT, "{case}: leaves {least}");
             assert_eq!(cut.deepest_rapid_mm, 0.0, "{case}");
             assert!(cut.deepest_bite_mm <= 0.15 + 1e-9, "{case}: bites {}", cut.deepest_bite_mm);
+        }
+    }
+}
+
+#[test]
+fn roughing_one_way_climbs_and_cuts_the_same() {
+    let relief = Relief::new([0.8, 0.5], STEP, [0.3, 0.2], |x, y| -0.3 * (x - 0.4).abs() - 0.2 * y);
+    let site = site(&relief, 0.001, 0.0);
+    for (direction_deg, axis, sign) in [(0.0, 0, -1), (90.0, 1, 1)] {
+        let zigzag = rough::Params { direction_deg, ..rough_params("flat:0.2") };
+        let climbing = rough::Params { pattern: Pattern::OneWay, ..zigzag };
+        let [mut one, mut other] = [Stock::blank(&site), Stock::blank(&site)];
+        let path = rough::rough(&site, &climbing, &|_| ()).unwrap();
+        assert_rules(&site, &path);
+        let mut cuts = 0;
+        for pair in path.moves.windows(2).filter(|pair| pair[1].kind == screenmill::toolpath::Kind::Cut) {
+            assert_eq!((pair[1].to[axis] - pair[0].to[axis]).signum(), sign);
+            assert_eq!(pair[1].to[1 - axis], pair[0].to[1 - axis]);
+            cuts += 1;
+        }
+        assert!(cuts > 10);
+        let climbed = one.cut(&site, climbing.shape, &path, 0.02, 0.0);
+        other.cut(&site, zigzag.shape, &rough::rough(&site, &zigzag, &|_| ()).unwrap(), 0.02, 0.0);
+        assert!(climbed.deepest_bite_mm <= 0.15 + 1e-9 && climbed.deepest_rapid_mm == 0.0);
+        for (a, b) in one.deviation(&relief).iter().zip(other.deviation(&relief)) {
+            // Links of a zigzag run at the height of the level above, where nothing is left to cut but cusps.
+            assert!(a.2 >= 0.05 - GOUGE - FLOAT && a.2 >= b.2 - 1e-6, "{a:?} {b:?}");
         }
     }
 }

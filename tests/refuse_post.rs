@@ -95,6 +95,7 @@ fn program(change: &str) -> String {
         section: None,
         tool: &tool,
         stock: &stock,
+        spindle: true,
         z_zero: ZZero::StockTop,
         wcs,
         clearance_mm,

@@ -80,6 +80,7 @@ fn rough_params() -> rough::Params {
         stepover_mm: None,
         stock_to_leave_mm: 0.05,
         direction_deg: 0.0,
+        pattern: Pattern::Zigzag,
         clear_mm: 0.2,
     }
 }

@@ -49,6 +49,7 @@ fn texts_of(
         section: None,
         tool,
         stock: &stock,
+        spindle: true,
         z_zero: ZZero::StockTop,
         wcs: "G55",
         clearance_mm: 5.0,

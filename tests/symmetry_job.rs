@@ -100,6 +100,15 @@ fn a_levelled_tile_turned_back_by_its_wedge_is_the_tile() {
             (lattice, surface.heights(lattice.window(), 0.0).expect("heights").z_mm)
         };
         let ((was, was_z), (is, is_z)) = (map(&*source), map(&*turned));
+        // The blank is for the tile as it lies, which is wider than its place, with a margin of 3 mm; a map has whole samples.
+        let file = tile["programs"][0]["file"].as_str().expect("a file");
+        let header = levelled.text(&format!("out/{file}"));
+        let stock = header.lines().find(|line| line.starts_with("(stock")).expect("its stock");
+        let blank: Vec<f64> = stock.split(' ').filter_map(|word| word.parse().ok()).collect();
+        assert!(
+            (blank[0] - is.width_mm - 6.0).abs() < STEP_MM && (blank[1] - is.height_mm - 6.0).abs() < STEP_MM,
+            "{stock}"
+        );
         // The map's z counts from where the tile's highest point is turned back to; the program's zero is 0.2 mm over
         // that point.
         let top = zero.z - (back * DVec3::new(0.0, 0.0, 0.2)).z;

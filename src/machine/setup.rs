@@ -22,6 +22,8 @@ pub struct Obstacle {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
     pub tile: Tile,
+    /// The tile's width and height as it lies on the machine; a levelled one is turned, and wider than its place.
+    pub size_mm: [f64; 2],
     /// The blank, in the tile's frame: X0 Y0 at the tile's lower left corner, z = 0 on the
     /// stock's top.
     pub blank: Bounds,
@@ -83,7 +85,8 @@ impl Setup {
             Obstacle { name: keep_out.name.clone(), bounds }
         });
         let obstacles = clamps.chain(boxes).collect();
-        Setup { tile, blank, zero_on_table_mm: zero, obstacles }
+        let size_mm = [tile.width_mm, tile.height_mm];
+        Setup { tile, size_mm, blank, zero_on_table_mm: zero, obstacles }
     }
 
     /// The plane in mm above the stock's top on which the tool may come from and go to anywhere: `retract_mm`, or
@@ -105,7 +108,7 @@ impl Setup {
         depth_mm: f64,
         margin_mm: f64,
     ) -> Result<(), Error> {
-        let size = [self.tile.width_mm, self.tile.height_mm];
+        let size = self.size_mm;
         for Obstacle { name, bounds } in &self.obstacles {
             if bounds.high_mm[2] <= -depth_mm {
                 continue;

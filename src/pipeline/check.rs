@@ -143,7 +143,7 @@ fn candidates<'a>(job: &Job, shop: &'a Shop, tiles: &[TileSetup]) -> Result<Vec<
     let needs = tiles.iter().map(|tile| tile.need());
     let depth_mm = needs.map(|need| need.depth_mm + need.top_allowance_mm).fold(0.0, f64::max);
     let mut candidates: Vec<Candidate> = Vec::new();
-    let tools = shop.library.tools.iter().chain(&shop.tools);
+    let tools = shop.library.tools.iter().chain(shop.shaping());
     for tool in tools.filter(|tool| tool.shape.radius_mm() >= job.part.step_mm) {
         if candidates.iter().any(|known| known.tool.shape == tool.shape) {
             continue;

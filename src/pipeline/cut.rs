@@ -9,17 +9,19 @@ use super::part::Part;
 use super::plan::{self, PostPrograms, TileSetup};
 use super::rescue::{shift, try_candidates};
 use super::shop::Shop;
+use super::tabs::{self, Slot};
+use super::underside::{self, Thin};
 use super::{Error, report};
 use crate::compensation::Profile;
 use crate::cutter::Shape;
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{self, Tally};
-use crate::job::{Blanks, Job};
+use crate::job::{Blanks, Face, Job, Kind, Level};
 use crate::machine::{self, Setup};
 use crate::progress::Progress;
 use crate::report::picture::{self, Caption};
 use crate::report::{Report, light_picture};
-use crate::verify::{self, Blank, BodyHit, Judged, LateralRapid};
+use crate::verify::{self, Blank, BodyHit, Judged, LateralRapid, ProgramCut};
 
 /// Pieces of a part are not made shorter than this to save travel in Z.
 const SMALLEST_TILE_MM: f64 = 20.0;
@@ -34,15 +36,26 @@ pub struct Milled {
     pub simulate: Vec<String>,
 }
 
+/// What the motions of one program do to the blank.
+#[derive(Clone, Debug, Default)]
+pub struct Motions {
+    pub cut: ProgramCut,
+    pub lateral_rapid: Option<LateralRapid>,
+    /// A shank or holder that runs into metal.
+    pub body_hit: Option<BodyHit>,
+    /// Where a cut of the underside comes nearest to the part.
+    pub thin: Option<Thin>,
+}
+
 /// One tile with its programs and what became of it.
 pub struct TileResult {
     pub tile: TileSetup,
     pub posts: Vec<PostPrograms>,
     pub verdict: Verdict,
     /// For each post and program, in run order.
-    pub lateral_rapids: Vec<Vec<Option<LateralRapid>>>,
-    /// Shanks and holders that run into metal, for each post and program.
-    pub body_hits: Vec<Vec<Option<BodyHit>>>,
+    pub motions: Vec<Vec<Motions>>,
+    /// For each post, the slots around the tile.
+    pub slots: Vec<Vec<Slot>>,
     pub maps: crate::report::MapFiles,
     pub map_factor: usize,
     /// Names of the cutters that were tried on the cavities, largest first.
@@ -69,13 +82,22 @@ pub fn mill(job: &Job, folder: &Path, staging: &Path, progress: &dyn Progress) -
 /// The tiles of a part, each checked against machine, blank and cutters before anything is planned.
 pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Error> {
     let steepest = part.whole.steepest();
-    let overruns = shop.tools.iter().map(|tool| plan::overrun_mm(job, &tool.shape, steepest));
-    let overrun_mm = overruns.fold(0.0, f64::max);
+    let overruns = shop.shaping().map(|tool| plan::overrun_mm(job, &tool.shape, steepest));
+    let slots = shop.tools.iter().zip(&shop.kinds).filter(|(_, kind)| **kind == Kind::CutOut);
+    let slots = slots.map(|(tool, _)| tool.shape.radius_mm());
+    let overrun_mm = overruns.chain(slots).fold(0.0, f64::max);
     let part_top_mm = part.whole.top_mm();
     let size_mm = part.size_mm();
     let put = |tile: &machine::Tile| -> Result<TileSetup, Error> {
         let piece = part.tile(job, tile)?;
-        let setup = Setup::place(tile.clone(), size_mm, &shop.stock, &shop.machine, &shop.fixture);
+        let mut lies = tile.clone();
+        if job.part.level == Level::Plane && job.stock.blanks == Blanks::PerTile {
+            // Turned, it is wider than its place in the part.
+            let lattice = piece.surface.lattice();
+            (lies.width_mm, lies.height_mm) = (lattice.width_mm, lattice.height_mm);
+        }
+        let setup = Setup::place(lies, size_mm, &shop.stock, &shop.machine, &shop.fixture);
+        let setup = Setup { tile: tile.clone(), ..setup };
         Ok(TileSetup::new(job, shop, setup, piece, part_top_mm))
     };
     let tiles = machine::split_in_z(
@@ -96,8 +118,17 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
         let depth_mm = need.depth_mm + need.top_allowance_mm;
         let [reach_mm, widest_mm] = plan::reach_mm(job, shop, steepest, depth_mm);
         setup.setup.check_reach(reach_mm, widest_mm, depth_mm, shop.stock.margin_mm)?;
-        for tool in &shop.tools {
+        for tool in shop.shaping() {
             tool.check_reach(depth_mm)?;
+        }
+        for (operation, tool) in job.operations.iter().zip(&shop.tools) {
+            let cut_mm = match operation.kind {
+                Kind::CutOut => job.stock.thickness_mm + operation.through_mm.unwrap_or(0.0),
+                _ => operation.depth_mm.unwrap_or(0.0),
+            };
+            tool.check_reach(cut_mm)?;
+            let stroke = machine::ZNeed { depth_mm: cut_mm, top_allowance_mm: 0.0, ..need };
+            machine::fits_z(&setup.setup.tile.name, stroke, &shop.machine)?;
         }
         setups.push(setup);
     }
@@ -107,7 +138,7 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
 /// The job's cutters that can reach a place which no other of them reaches. A ball is a union of smaller balls, so
 /// of several balls only the smallest counts (on samples its closing is the lowest to 0.25 um at 10 um).
 fn reaching(shop: &Shop) -> Vec<Shape> {
-    let shapes = shop.tools.iter().map(|tool| tool.shape);
+    let shapes = shop.shaping().map(|tool| tool.shape);
     let is_ball = |shape: &Shape| matches!(shape, Shape::Ball { .. });
     let balls = shapes.clone().filter(is_ball);
     let smallest = balls.min_by(|a, b| a.radius_mm().total_cmp(&b.radius_mm()));
@@ -139,28 +170,19 @@ fn judged(
     let step_mm = lattice.step_mm;
     let blank = blank(job, part, &tile);
     let zero_mm = [0.0, 0.0, tile.z_zero_mm];
-    let judged: Vec<Vec<Judged>> = posts
+    // The underside is judged by itself.
+    let up = |face: Face| move |program: &&plan::Program| program.face == face;
+    let tops: Vec<Vec<&plan::Program>> =
+        posts.iter().map(|post| post.programs.iter().filter(up(Face::Top)).collect()).collect();
+    let judged: Vec<Vec<Judged>> = tops
         .iter()
-        .map(|post| {
-            let programs = post.programs.iter();
+        .map(|programs| {
+            let programs = programs.iter();
             programs.map(|p| Judged::new(&p.reading, shop.tools[p.operation].shape, zero_mm)).collect()
         })
         .collect();
-    let lateral_rapids = judged
-        .iter()
-        .map(|programs| programs.iter().map(|program| program.lateral_rapid(&blank)).collect())
-        .collect();
     progress.begin("shanks", 1);
     let nose_mm = shop.machine.spindle.nose_diameter_mm;
-    // An operation may be several programs.
-    let bodies = |post: &PostPrograms| -> Vec<_> {
-        post.programs.iter().map(|program| shop.tools[program.operation].cylinders(nose_mm)).collect()
-    };
-    let body_hits = posts
-        .iter()
-        .zip(&judged)
-        .map(|(post, programs)| verify::body_hits(&blank, programs, &bodies(post)))
-        .collect();
     let cutters = distinct(reaching(shop).into_iter(), step_mm)?;
     let (names, candidates) = candidates(shop, step_mm)?;
     let steepest = part.whole.steepest();
@@ -193,8 +215,29 @@ fn judged(
     let at = &tile.setup.tile;
     let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;
     draw_means(staging, job, &tile, &verdict, lattice.step_mm)?;
+    let mut motions = Vec::new();
+    let mut slots = Vec::new();
+    for (nth, (post, judged)) in posts.iter().zip(&judged).enumerate() {
+        let bodies: Vec<_> = tops[nth].iter().map(|p| shop.tools[p.operation].cylinders(nose_mm)).collect();
+        let hits = verify::body_hits(&blank, judged, &bodies);
+        let top = judged.iter().zip(hits).zip(&verdict.cuts[nth]).map(|((judged, body_hit), &cut)| Motions {
+            cut,
+            lateral_rapid: judged.lateral_rapid(&blank),
+            body_hit,
+            thin: None,
+        });
+        let under: Vec<&plan::Program> = post.programs.iter().filter(up(Face::Underside)).collect();
+        let mut of_faces = (top, underside::judge(shop, &tile, &under)?.into_iter());
+        let in_order = post.programs.iter().filter_map(|program| match program.face {
+            Face::Top => of_faces.0.next(),
+            Face::Underside => of_faces.1.next(),
+        });
+        motions.push(in_order.collect());
+        slots.push(tabs::slots(job, shop, &tile, &blank, judged));
+    }
     drop(judged);
-    Ok(TileResult { tile, posts, verdict, lateral_rapids, body_hits, maps, map_factor, candidates: names })
+    drop(tops);
+    Ok(TileResult { tile, posts, verdict, motions, slots, maps, map_factor, candidates: names })
 }
 
 /// Pictures of the normals' errors and of lost light.
@@ -286,7 +329,7 @@ fn blank(job: &Job, part: &Part, tile: &TileSetup) -> Blank {
 
 /// The library's cutters below the job's smallest, largest first.
 fn candidates(shop: &Shop, step_mm: f64) -> Result<(Vec<String>, Vec<Profile>), Error> {
-    let smallest = shop.tools.iter().map(|tool| tool.shape.radius_mm()).fold(f64::INFINITY, f64::min);
+    let smallest = shop.shaping().map(|tool| tool.shape.radius_mm()).fold(f64::INFINITY, f64::min);
     let mut tools: Vec<_> = shop.library.tools.iter().collect();
     tools.retain(|tool| {
         let radius = tool.shape.radius_mm();

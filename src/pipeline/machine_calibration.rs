@@ -168,6 +168,7 @@ fn measured(
         section: None,
         tool: &tool,
         stock: &stock,
+        spindle: true,
         z_zero: ZZero::StockTop,
         wcs: dialect.wcs.first().map_or("", String::as_str),
         clearance_mm: HEIGHT_MM,

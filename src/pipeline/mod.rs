@@ -8,6 +8,7 @@
 //!
 //! Everything is written under a staging folder that the caller renames when all of it stands.
 
+mod beside;
 mod check;
 mod cut;
 mod error;
@@ -21,10 +22,13 @@ mod part;
 mod plan;
 mod press;
 mod relit;
+mod remarks;
 mod report;
 mod rescue;
 mod sheet;
 mod shop;
+mod tabs;
+mod underside;
 
 pub use check::{Checked, Reach, check};
 pub use cut::{Milled, mill};

@@ -2,20 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Error;
+use super::cut::distinct;
 use super::judge::ExactPasses;
 use super::part::TileSurface;
 use super::press::Press;
 use super::shop::Shop;
+use super::{Error, beside};
 use crate::compensation::Profile;
 use crate::cutter::Shape;
-use crate::job::{self, Job, ZZero};
+use crate::job::{self, Face, Job, ZZero};
 use crate::machine::{Bounds, Guard, Setup, Tool, ZNeed};
 use crate::post::{Dialect, Section};
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::tolerance::Budget;
-use crate::toolpath::{self, Retract, Site, finish, rough};
+use crate::toolpath::{self, Rest, Retract, Site, finish, rough};
 use crate::verify::{Extent, Reading, Timing};
 
 /// Passes between two places where a zigzag program can start again.
@@ -27,6 +28,9 @@ const RESTART_MM: f64 = 10e3;
 
 /// Room around a shank that goes below the stock's top.
 const SHANK_ROOM_MM: f64 = 0.2;
+
+/// Room around clamps that an outline run keeps.
+pub const SPARE_MM: f64 = 1.0;
 
 /// A tile on the machine: its surface, its blank and the frames between them.
 pub struct TileSetup {
@@ -46,6 +50,8 @@ pub struct Program {
     pub file: PathBuf,
     /// Position among the job's operations.
     pub operation: usize,
+    /// Which side of the blank is up.
+    pub face: Face,
     /// None where the operation is one program.
     pub section: Option<Section>,
     pub reading: Reading,
@@ -60,6 +66,8 @@ pub struct PostPrograms {
     pub dialect: String,
     pub budget: Budget,
     pub programs: Vec<Program>,
+    /// Operations that have nothing to cut here.
+    pub left_out: Vec<usize>,
     pub passes: Vec<ExactPasses>,
 }
 
@@ -88,6 +96,14 @@ impl TileSetup {
             depth_mm: self.surface().top_mm() - self.surface().bottom_mm(),
             top_allowance_mm: self.allowance_mm,
             clearance_mm: self.clearance_mm,
+        }
+    }
+
+    /// The program's Z0 above the blank's face that is up.
+    pub fn zero_over_face_mm(&self, face: Face) -> f64 {
+        match face {
+            Face::Top => self.z_zero_mm - self.allowance_mm,
+            Face::Underside => 0.0,
         }
     }
 
@@ -129,7 +145,8 @@ pub fn overrun_mm(job: &Job, shape: &Shape, steepest: [f64; 2]) -> f64 {
 
 /// Metal beside the tile that roughing takes out of the way of the cutters after operation `index`.
 fn clear_mm(job: &Job, shop: &Shop, index: usize, steepest: [f64; 2], cut_mm: f64) -> f64 {
-    let later = shop.tools[index + 1..].iter();
+    let later = shop.tools.iter().zip(&shop.kinds).skip(index + 1);
+    let later = later.filter(|(_, kind)| kind.shapes()).map(|(tool, _)| tool);
     later.map(|tool| widest_mm(tool, cut_mm) + overrun_mm(job, &tool.shape, steepest)).fold(0.0, f64::max)
 }
 
@@ -145,9 +162,12 @@ pub fn reach_mm(job: &Job, shop: &Shop, steepest: [f64; 2], cut_mm: f64) -> [f64
                 let stepover = operation.stepover_mm.unwrap_or(rough::STEPOVER * 2.0 * radius);
                 (radius.max(clear - radius) + job.part.step_mm, stepover)
             }
-            job::Kind::Finish => {
+            job::Kind::Finish | job::Kind::Rest => {
                 (overrun_mm(job, &tool.shape, steepest), operation.stepover_mm.unwrap_or(0.1 * radius))
             }
+            job::Kind::CutOut => (radius, 0.0),
+            // Where they lie is the job's own choice; their motions are checked as they are read back.
+            job::Kind::Outline | job::Kind::Drill | job::Kind::Mark => continue,
         };
         let shank = tool.body.map_or(0.0, |body| 0.5 * body.shank_diameter_mm);
         sure = sure.max(axis_mm + radius);
@@ -190,9 +210,18 @@ pub fn programs(
         unit_mm: dialect.unit_mm,
         budget,
     };
-    let mut planned =
-        PostPrograms { dialect: dialect.name.clone(), budget, programs: Vec::new(), passes: Vec::new() };
-    for (index, operation) in job.operations.iter().enumerate() {
+    let mut planned = PostPrograms {
+        dialect: dialect.name.clone(),
+        budget,
+        programs: Vec::new(),
+        left_out: Vec::new(),
+        passes: Vec::new(),
+    };
+    // Last of all, since they go around the others.
+    let outlines = |index: &usize| job.operations[*index].kind == job::Kind::Outline;
+    let (last, first): (Vec<usize>, Vec<usize>) = (0..job.operations.len()).partition(outlines);
+    for index in first.into_iter().chain(last) {
+        let operation = &job.operations[index];
         let tool = &shop.tools[index];
         let guard = Guard::new(&tile.setup.obstacles, tool.columns(shop.machine.spindle.nose_diameter_mm));
         let above_mm = job.machine.clearance_mm;
@@ -223,26 +252,13 @@ pub fn programs(
                     stepover_mm: operation.stepover_mm,
                     stock_to_leave_mm: operation.stock_to_leave_mm,
                     direction_deg: operation.direction_deg,
+                    pattern: pattern(operation),
                     clear_mm,
                 };
                 rough::rough(&site, &params, &tell).map_err(refused)?
             }
             job::Kind::Finish => {
-                let spacing = match (operation.stepover_mm, operation.scallop_mm) {
-                    (Some(stepover_mm), _) => finish::Spacing::StepoverMm(stepover_mm),
-                    (None, scallop_mm) => finish::Spacing::ScallopMm(scallop_mm.unwrap_or_default()),
-                };
-                let params = finish::Params {
-                    shape: tool.shape,
-                    spacing,
-                    direction_deg: operation.direction_deg,
-                    pattern: match operation.pattern {
-                        job::Pattern::Zigzag => finish::Pattern::Zigzag,
-                        job::Pattern::OneWay => finish::Pattern::OneWay,
-                    },
-                    stock_to_leave_mm: operation.stock_to_leave_mm,
-                    restart_passes: RESTART_PASSES,
-                };
+                let params = finishing(operation, tool);
                 if operation.stock_to_leave_mm == 0.0 {
                     let layout = finish::layout(&site, &params).map_err(refused)?;
                     let profile = Profile::new(tool.shape, lattice.step_mm, 0.0)?;
@@ -250,24 +266,79 @@ pub fn programs(
                 }
                 finish::finish(&site, &params, &tell).map_err(refused)?
             }
+            job::Kind::Rest => {
+                let before = job.operations[..index].iter().zip(&shop.tools);
+                let before = before.filter(|(operation, _)| operation.finishes()).map(|(_, tool)| tool.shape);
+                let before = distinct(before, lattice.step_mm)?;
+                let (over_mm, radius_mm) = (operation.leftover_or_default_mm(), tool.shape.radius_mm());
+                let rest = Rest::find(surface, &before, over_mm, radius_mm, &tell).map_err(refused)?;
+                progress.begin(&format!("{} {}", operation.kind.word(), tool.name), 1000);
+                told.set(0);
+                let stay_mm = stay_mm(shop, tool, above_mm + tile.allowance_mm + 0.5 * need.depth_mm);
+                finish::rest(&site, &finishing(operation, tool), &rest, stay_mm, &tell).map_err(refused)?
+            }
+            _ => {
+                let work = beside::Work { operation, tool, tile, shop, guard: &guard };
+                work.path(&site, &planned.programs).map_err(refused)?
+            }
         };
         if progress.interrupted() {
             return Err(Error::Interrupted);
+        }
+        if path.moves.is_empty() {
+            planned.left_out.push(index);
+            continue;
         }
         let number = planned.programs.len() as u32 + 1;
         let press = Press { job, shop, tile, dialect, folder, progress };
         planned.programs.extend(press.print(index, number, &path)?);
     }
+    if job.operations.iter().any(|operation| operation.kind == job::Kind::Rest) {
+        // What passes leave that are only here and there is not worked out.
+        planned.passes.clear();
+    }
+    // In run order.
+    planned.programs.sort_by_key(|program| program.operation);
     Ok(planned)
 }
 
-/// A place of the program as the setup has it: z above the stock's top.
-pub fn over_stock(place_mm: [f64; 3], tile: &TileSetup) -> [f64; 3] {
-    let [x, y, z] = place_mm;
-    [x, y, z + tile.z_zero_mm - tile.allowance_mm]
+/// The longest gap over which it takes no longer to go on cutting than to retract by `height_mm`, travel and come down.
+fn stay_mm(shop: &Shop, tool: &Tool, height_mm: f64) -> f64 {
+    let rate = &shop.machine.rate;
+    let minutes = 2.0 * height_mm / rate.rapid_z_mm_min + toolpath::APPROACH_MM / tool.plunge_mm_min;
+    tool.feed_mm_min * minutes
 }
 
-/// The box of a program's motions as the setup checks it: z above the stock's top.
-pub fn bounds_over_stock(extent: &Extent, tile: &TileSetup) -> Bounds {
-    Bounds { low_mm: over_stock(extent.low_mm, tile), high_mm: over_stock(extent.high_mm, tile) }
+fn pattern(operation: &job::Operation) -> finish::Pattern {
+    match operation.pattern {
+        job::Pattern::Zigzag => finish::Pattern::Zigzag,
+        job::Pattern::OneWay => finish::Pattern::OneWay,
+    }
+}
+
+/// What a finishing operation asks for.
+fn finishing(operation: &job::Operation, tool: &Tool) -> finish::Params {
+    finish::Params {
+        shape: tool.shape,
+        spacing: match (operation.stepover_mm, operation.scallop_mm) {
+            (Some(stepover_mm), _) => finish::Spacing::StepoverMm(stepover_mm),
+            (None, scallop_mm) => finish::Spacing::ScallopMm(scallop_mm.unwrap_or_default()),
+        },
+        direction_deg: operation.direction_deg,
+        pattern: pattern(operation),
+        stock_to_leave_mm: operation.stock_to_leave_mm,
+        restart_passes: RESTART_PASSES,
+    }
+}
+
+/// A place of a program as the setup has it: z above the face of the blank that is up.
+pub fn over_stock(place_mm: [f64; 3], tile: &TileSetup, face: Face) -> [f64; 3] {
+    let [x, y, z] = place_mm;
+    [x, y, z + tile.zero_over_face_mm(face)]
+}
+
+/// The box of a program's motions as the setup checks it: z above the face of the blank that is up.
+pub fn bounds_over_stock(extent: &Extent, tile: &TileSetup, face: Face) -> Bounds {
+    let place = |mm| over_stock(mm, tile, face);
+    Bounds { low_mm: place(extent.low_mm), high_mm: place(extent.high_mm) }
 }

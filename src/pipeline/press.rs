@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::Error;
 use super::plan::{Program, TileSetup};
 use super::shop::Shop;
-use crate::job::{Job, ZZero};
+use crate::job::{Face, Job, Kind, Operation, ZZero};
 use crate::post::{self, Dialect, Section};
 use crate::progress::Progress;
 use crate::toolpath::Toolpath;
@@ -29,30 +29,37 @@ impl Press<'_> {
     /// is that of the first program among those of the tile.
     pub fn print(&self, operation: usize, number: u32, path: &Toolpath) -> Result<Vec<Program>, Error> {
         let Press { job, shop, tile, .. } = self;
+        let wanted = &job.operations[operation];
+        let face = wanted.face;
         let blank = tile.setup.blank;
         let stock = post::StockFacts {
             material: job.stock.material.clone(),
             width_mm: blank.high_mm[0] - blank.low_mm[0],
             height_mm: blank.high_mm[1] - blank.low_mm[1],
             thickness_mm: job.stock.thickness_mm,
-            top_allowance_mm: tile.allowance_mm,
+            top_allowance_mm: match face {
+                Face::Top => tile.allowance_mm,
+                Face::Underside => 0.0,
+            },
         };
+        let notes = notes(wanted);
         let whole = post::Program {
             path,
             part: &job.name,
             tile: &tile.setup.tile.name,
-            operation: job.operations[operation].kind.word(),
+            operation: wanted.kind.word(),
             number,
             section: None,
             tool: &shop.tools[operation],
             stock: &stock,
-            z_zero: match job.stock.z_zero {
-                ZZero::StockTop => post::ZZero::StockTop,
-                ZZero::PartTop => post::ZZero::PartTop,
+            z_zero: match (face, job.stock.z_zero) {
+                (Face::Top, ZZero::PartTop) => post::ZZero::PartTop,
+                _ => post::ZZero::StockTop,
             },
+            spindle: wanted.kind != Kind::Outline,
             wcs: &job.machine.wcs,
-            clearance_mm: tile.allowance_mm - tile.z_zero_mm + tile.clearance_mm,
-            notes: &[],
+            clearance_mm: tile.clearance_mm - tile.zero_over_face_mm(face),
+            notes: &notes,
         };
         let mut programs = Vec::new();
         for (section, path) in post::sections(&whole, self.dialect, &shop.machine)? {
@@ -87,7 +94,8 @@ impl Press<'_> {
         post::stamp_time(&mut out, &written, self.dialect, timing.total_s)?;
         out.flush().map_err(output)?;
         let tilt = program.path.tilt;
-        Ok(Program { file, operation, section: program.section, reading, extent, timing, tilt })
+        let face = self.job.operations[operation].face;
+        Ok(Program { file, operation, face, section: program.section, reading, extent, timing, tilt })
     }
 
     /// `programs/<tile>-<nn>-<operation>-<tool>.<ext>`, with `-s<nn>` for a section, in a folder for each
@@ -108,4 +116,20 @@ impl Press<'_> {
             programs.join(name)
         }
     }
+}
+
+/// What the header says of work beside the surface.
+fn notes(operation: &Operation) -> Vec<(&'static str, String)> {
+    let mut notes = Vec::new();
+    if operation.face == Face::Underside {
+        notes.push((
+            "face",
+            "underside: turn the blank over left to right; X0 Y0 is the tile's lower left corner as it lies then"
+                .into(),
+        ));
+    }
+    if operation.kind == Kind::Outline {
+        notes.push(("air", "runs round the tile, then round all that is cut; spindle off".into()));
+    }
+    notes
 }

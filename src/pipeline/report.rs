@@ -2,20 +2,18 @@
 
 use std::path::Path;
 
-use super::cut::{Milled, TileResult};
+use super::cut::{Milled, Motions, TileResult};
 use super::part::Part;
-use super::plan::{self, Program};
+use super::remarks::{of_face, of_motions, of_rounding, of_wear};
 use super::shop::Shop;
 use super::{Error, WITHIN, light, pages};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
-use crate::job::{Form, Job};
-use crate::machine::Guard;
+use crate::job::{Face, Form, Job};
 use crate::report::cavity_list::{self, TileCavities};
 use crate::report::picture::{Caption, write_png};
 use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
 use crate::tolerance::Budget;
-use crate::verify::{Judged, Language, ProgramCut};
 
 /// Where in the room the light of the whole job goes.
 pub(super) const ROOM_PICTURE: &str = "maps/light-room.png";
@@ -133,6 +131,15 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
         );
         found.push(finding(Severity::Warning, "undercut", message).on(&name));
     }
+    for index in &result.posts[0].left_out {
+        let message = format!(
+            "operation {} ({}, {}) has nothing to cut: the cutters before leave no more than its leftover_mm",
+            index + 1,
+            shop.kinds[*index].word(),
+            shop.tools[*index].name
+        );
+        found.push(finding(Severity::Note, "left-out", message).on(&name));
+    }
     for post in 0..result.posts.len() {
         let mut of_post = Vec::new();
         let figures = result.tally(post).figures();
@@ -150,10 +157,11 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
         }
         let mut of_programs = Vec::new();
         for (index, program) in result.posts[post].programs.iter().enumerate() {
-            let cut = &result.verdict.cuts[post][index];
+            let cut = &result.motions[post][index].cut;
             let mut remarks = Vec::from_iter(of_rounding(result, program));
             remarks.extend(of_wear(shop, program, cut));
             remarks.extend(of_motions(shop, result, post, index));
+            remarks.extend(of_face(job, shop, result, post, index));
             of_programs.push(remarks);
         }
         let remarked = of_programs.iter().flatten().map(|remark| &remark.finding);
@@ -177,150 +185,11 @@ fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> R
     Ok(found)
 }
 
-/// A finding on a program before it is known where its file goes.
-struct Remark {
-    /// Of the program's text.
-    line: Option<u32>,
-    finding: Finding,
-}
-
-impl Remark {
-    fn new(severity: Severity, code: &'static str, line: Option<u32>, message: String) -> Remark {
-        Remark { line, finding: finding(severity, code, message) }
-    }
-
-    fn at(self, place_mm: &[f64]) -> Remark {
-        Remark { finding: self.finding.at(place_mm), ..self }
-    }
-
-    fn on(mut self, program: &Program) -> Finding {
-        let line = self.line.map_or(String::new(), |line| format!(":{line}"));
-        self.finding.message = format!("{}{line}: {}", program.file.display(), self.finding.message);
-        self.finding
-    }
-}
-
-/// Errors of one program's motions.
-fn of_motions(shop: &Shop, result: &TileResult, post: usize, index: usize) -> Vec<Remark> {
-    let tile = &result.tile;
-    let program = &result.posts[post].programs[index];
-    let cut = &result.verdict.cuts[post][index];
-    let mut found = Vec::new();
-    let tool = &shop.tools[program.operation];
-    let bounds = plan::bounds_over_stock(&program.extent, tile);
-    let checked = tile.setup.check(&bounds, shop.fixture.sacrificial_mm, &shop.machine);
-    if let Err(refusal) = checked {
-        found.push(Remark::new(Severity::Error, "travel", None, refusal.to_string()));
-    }
-    let guard = Guard::new(&tile.setup.obstacles, tool.columns(shop.machine.spindle.nose_diameter_mm));
-    let motions = &program.reading.motions;
-    let met = guard.first_met(motions.len(), |index| plan::over_stock(motions[index].to_mm, tile));
-    if let Some(met) = met {
-        let message = format!(
-            "the {} of {} runs into \"{}\", {:.3} mm below its top ({} mm above the stock); hint: a larger margin_mm, another fixture or a tool that sticks out further",
-            met.what, tool.name, met.obstacle, met.below_mm, met.top_mm
-        );
-        let place = result.in_part([met.at_mm[0], met.at_mm[1]]);
-        found.push(Remark::new(Severity::Error, "clamp", Some(motions[met.motion].line), message).at(&place));
-    }
-    if let Some(hit) = result.body_hits[post][index] {
-        let message = format!(
-            "the {} of {} is {:.3} mm too deep in the metal beside the cutter; hint: a tool with a longer neck, an operation that clears more before it, or level = \"plane\"",
-            hit.what, tool.name, hit.depth_mm
-        );
-        let place = result.in_part([hit.at_mm[0], hit.at_mm[1]]);
-        found.push(Remark::new(Severity::Error, "holder", Some(hit.line), message).at(&place));
-    }
-    if let Some(bite) = cut.rapid {
-        let message = format!("a rapid goes {:.4} mm deep through the stock", bite.depth_mm);
-        let place = result.in_part([bite.at_mm[0], bite.at_mm[1]]);
-        found.push(Remark::new(Severity::Error, "rapid-through-stock", Some(bite.line), message).at(&place));
-    }
-    if let Some(rapid) = &result.lateral_rapids[post][index] {
-        let message = format!("a rapid in X or Y runs {:.4} mm below the stock's top", rapid.below_mm);
-        found.push(Remark::new(Severity::Error, "lateral-rapid", Some(rapid.line), message));
-    }
-    if !cut.touched() {
-        let message = "cuts nothing; hint: leave the operation out".to_string();
-        found.push(Remark::new(Severity::Warning, "air", None, message));
-    }
-    found
-}
-
-/// How far the controller's grid turns the mirrors, as planned: what an operator can know before the cut.
-fn of_rounding(result: &TileResult, program: &Program) -> Option<Remark> {
-    let tilt = program.tilt?;
-    let (rms_deg, worst) = (tilt.rms_deg()?, tilt.worst?);
-    let message = format!(
-        "rounding and simplification turn mirrors along the passes by {rms_deg:.3} degrees rms, at most {:.3} degrees over {:.2} mm",
-        worst.deg, worst.length_mm
-    );
-    let note = Remark::new(Severity::Note, "rounding-tilt", None, message);
-    Some(note.at(&result.in_part(worst.at_mm)))
-}
-
-/// What a program asks of its cutter, and what its reader noticed.
-fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> {
-    let tool = &shop.tools[program.operation];
-    let mut found = Vec::new();
-    let bite_mm = cut.deepest_bite_mm();
-    if let Some(most_mm) = tool.max_depth_mm
-        && bite_mm > most_mm
-    {
-        let message = format!(
-            "{} bites {bite_mm:.3} mm deep at once, its max_depth_mm is {most_mm}; hint: a smaller stepdown, or a semi-finish before it",
-            tool.name
-        );
-        found.push(Remark::new(Severity::Warning, "bite", None, message));
-    }
-    let length_m = program.extent.cutting_mm * 1e-3;
-    if let Some(life_m) = tool.tool_life_m
-        && length_m > life_m
-    {
-        let message = format!(
-            "{length_m:.0} m of cut without a retract, {} lasts {life_m} m; hint: pattern = \"one-way\" can be cut in sections at every pass",
-            tool.name
-        );
-        found.push(Remark::new(Severity::Warning, "tool-life", None, message));
-    }
-    if let Some(section) = program.section.filter(|section| section.index == 1) {
-        let message = format!(
-            "the first of {} sections; the setup sheet says where a fresh {} begins",
-            section.count, tool.name
-        );
-        found.push(Remark::new(Severity::Note, "sections", None, message));
-    }
-    // RML-1 has no rapid word, so that its travel above the part is a feed like any other.
-    let gcode = program.reading.summary.language == Language::GCode;
-    let feeds = Judged::new(&program.reading, tool.shape, [0.0; 3]).feeds();
-    for (fastest, most, key) in [
-        (feeds.lateral, tool.feed_mm_min, "feed_mm_min"),
-        (feeds.plunge, tool.plunge_mm_min, "plunge_mm_min"),
-    ] {
-        if let Some(fastest) = fastest.filter(|fastest| gcode && fastest.feed_mm_min > most + 1e-3) {
-            let message =
-                format!("feeds {} mm/min, the {key} of {} is {most}", fastest.feed_mm_min, tool.name);
-            found.push(Remark::new(Severity::Warning, "feed", Some(fastest.line), message));
-        }
-    }
-    if let Some(bite) = cut.plunge.filter(|bite| bite.depth_mm > tool.shape.radius_mm()) {
-        let message = format!(
-            "plunges {:.3} mm straight down into solid, more than the radius of {}; hint: a smaller stepdown",
-            bite.depth_mm, tool.name
-        );
-        found.push(Remark::new(Severity::Warning, "plunge", Some(bite.line), message));
-    }
-    for note in &program.reading.summary.notes {
-        found.push(Remark::new(Severity::Note, "program", None, note.to_string()));
-    }
-    found
-}
-
 fn tile(job: &Job, shop: &Shop, result: &TileResult) -> report::Tile {
     let at = &result.tile.setup.tile;
     let mut programs = Vec::new();
-    for (post, cuts) in result.posts.iter().zip(&result.verdict.cuts) {
-        for (program, cut) in post.programs.iter().zip(cuts) {
+    for (post, motions) in result.posts.iter().zip(&result.motions) {
+        for (program, Motions { cut, .. }) in post.programs.iter().zip(motions) {
             let tool = &shop.tools[program.operation];
             let (low, high) = (program.extent.low_mm, program.extent.high_mm);
             programs.push(report::Program {
@@ -449,9 +318,9 @@ fn of_limits(job: &Job, report: &Report, figures: &Figures) -> Vec<Finding> {
 /// The command that judges a tile's programs again from the files alone.
 fn simulate(shop: &Shop, result: &TileResult) -> String {
     let post = &result.posts[0];
-    let files: Vec<String> = post.programs.iter().map(|p| format!("{{out}}/{}", p.file.display())).collect();
-    let cutters: Vec<String> =
-        post.programs.iter().map(|p| shop.tools[p.operation].shape.to_string()).collect();
+    let top = post.programs.iter().filter(|program| program.face == Face::Top);
+    let files: Vec<String> = top.clone().map(|p| format!("{{out}}/{}", p.file.display())).collect();
+    let cutters: Vec<String> = top.map(|p| shop.tools[p.operation].shape.to_string()).collect();
     let top_mm = result.tile.piece.origin_mm.z;
     let tile = &result.tile;
     let name = &tile.setup.tile.name;

@@ -11,10 +11,14 @@ use super::cut::TileResult;
 use super::plan::Program;
 use super::shop::Shop;
 use crate::cutter::Shape;
-use crate::job::{Blanks, Job, Kind, ZZero};
+use crate::job::{Blanks, Face, Job, Kind, ZZero};
 use crate::machine::{Fixture, Side};
 use crate::report::setup_sheet::{SetupSheet, SheetProgram, SheetTile, SheetTool};
 use crate::report::{Bounds, Report, Severity};
+
+/// Said where the blank is turned over.
+const UNDERSIDE_UP: &str = "Turn the blank over left to right, its underside up. X0 Y0 is the tile's lower left corner as it lies then, Z0 the face that is up.";
+const TOP_UP: &str = "Turn the blank back, its top up. Find X0 Y0 and Z0 anew.";
 
 /// Rim of uncut metal that a paper or a probe needs.
 const RIM_MM: f64 = 1.5;
@@ -88,7 +92,13 @@ fn tile(job: &Job, shop: &Shop, result: &TileResult, staging: &Path) -> Result<S
     let mut programs = Vec::new();
     for post in &result.posts {
         let mut before = None;
+        let mut face = Face::Top;
         for program in &post.programs {
+            let turn = (program.face != face).then_some(match program.face {
+                Face::Underside => UNDERSIDE_UP,
+                Face::Top => TOP_UP,
+            });
+            face = program.face;
             let tool = &shop.tools[program.operation];
             let number = tool.number.unwrap_or(program.operation as u32 + 1);
             if !tools.iter().any(|known| known.name == tool.name) {
@@ -118,8 +128,10 @@ fn tile(job: &Job, shop: &Shop, result: &TileResult, staging: &Path) -> Result<S
                 time_s: program.timing.total_s,
                 bounds_mm: Bounds { x: [low[0], high[0]], y: [low[1], high[1]], z: [low[2], high[2]] },
                 sha256: sha256(&staging.join(&program.file))?,
-                re_zero_z: before.is_some_and(|name| name != tool.name.as_str())
-                    || program.section.is_some_and(|section| section.index > 1 && section.fresh_cutter),
+                turn: turn.map(String::from),
+                re_zero_z: turn.is_none()
+                    && (before.is_some_and(|name| name != tool.name.as_str())
+                        || program.section.is_some_and(|section| section.index > 1 && section.fresh_cutter)),
             });
             before = Some(tool.name.as_str());
         }
@@ -135,10 +147,11 @@ fn tile(job: &Job, shop: &Shop, result: &TileResult, staging: &Path) -> Result<S
             "The programs of the posts are the same work in other words: run those of one of them.".into(),
         );
     }
+    notes.extend(beside(job, shop, result));
     Ok(SheetTile {
         name: at.name.clone(),
         place_mm: [at.x_mm, at.y_mm],
-        size_mm: [at.width_mm, at.height_mm],
+        size_mm: tile.setup.size_mm,
         blank_mm: [size_mm[0], size_mm[1], job.stock.thickness_mm],
         margin_mm: job.stock.margin_mm,
         origin_on_blank_mm: [-blank.low_mm[0], -blank.low_mm[1]],
@@ -170,6 +183,53 @@ fn tile(job: &Job, shop: &Shop, result: &TileResult, staging: &Path) -> Result<S
     })
 }
 
+/// What is cut beside the surface, and how the blank lies for it.
+fn beside(job: &Job, shop: &Shop, result: &TileResult) -> Vec<String> {
+    let programs = &result.posts[0].programs;
+    let files = |wanted: &dyn Fn(&Program) -> bool| -> Option<String> {
+        let files = programs.iter().filter(|program| wanted(program));
+        let files: Vec<String> = files.map(|program| program.file.display().to_string()).collect();
+        (!files.is_empty()).then(|| files.join(", "))
+    };
+    let mut notes = Vec::new();
+    for slot in &result.slots[0] {
+        let Some(files) = files(&|program| program.operation == slot.operation) else { continue };
+        let skin_mm = -slot.cut_out.through_mm;
+        let held = match slot.cut_out.tab {
+            Some(tab) => format!(
+                "{} tabs of {} mm, {} mm high, hold it: saw them off and dress the edge",
+                slot.standing, tab.width_mm, tab.height_mm
+            ),
+            None if skin_mm > 0.0 => "there are no tabs".into(),
+            None => "there are no tabs: only what lies under it holds it at the end".into(),
+        };
+        let floor = if skin_mm > 0.0 {
+            format!("leaves a skin of {skin_mm} mm")
+        } else {
+            format!("goes {} mm past the blank's underside", slot.cut_out.through_mm)
+        };
+        notes.push(format!("{files} cuts the tile out of its blank and {floor}; {held}."));
+    }
+    for (index, (operation, tool)) in job.operations.iter().zip(&shop.tools).enumerate() {
+        let Some(files) = files(&|program| program.operation == index) else { continue };
+        if operation.kind == Kind::Drill {
+            notes.push(format!(
+                "{files}: {} holes of {} mm, {} mm deep.",
+                operation.holes_mm.len() + operation.places.len(),
+                operation.diameter_mm.unwrap_or(2.0 * tool.shape.radius_mm()),
+                operation.depth_mm.unwrap_or_default()
+            ));
+        }
+        if operation.kind == Kind::Mark {
+            notes.push(format!(
+                "{files}: engraves \"{}\" with an arrow that points to the back of the machine, the tile's upper edge.",
+                result.tile.setup.tile.name
+            ));
+        }
+    }
+    notes
+}
+
 fn clamped(fixture: &Fixture, top_on_table_mm: f64) -> String {
     let mut sides: Vec<String> = Vec::new();
     for clamp in &fixture.clamp {
@@ -193,10 +253,14 @@ fn clamped(fixture: &Fixture, top_on_table_mm: f64) -> String {
 /// Where Z0 is found for the tools after the first: the tile's own top is cut away by then.
 fn re_zero(job: &Job, shop: &Shop, result: &TileResult) -> String {
     let margin_mm = job.stock.margin_mm;
-    let size = [result.tile.setup.tile.width_mm, result.tile.setup.tile.height_mm];
+    let size = result.tile.setup.size_mm;
     // How far past each side of the tile something of the top is cut.
     let mut past = [0.0f64; 4];
-    for program in result.posts.iter().flat_map(|post| &post.programs) {
+    let cuts = |program: &&Program| {
+        let kind = job.operations[program.operation].kind;
+        program.face == Face::Top && (kind.shapes() || kind == Kind::CutOut)
+    };
+    for program in result.posts.iter().flat_map(|post| &post.programs).filter(cuts) {
         let radius = shop.tools[program.operation].shape.radius_mm();
         let (low, high) = (program.extent.low_mm, program.extent.high_mm);
         let sides = [-low[0], high[0] - size[0], -low[1], high[1] - size[1]];
@@ -221,14 +285,21 @@ fn re_zero(job: &Job, shop: &Shop, result: &TileResult) -> String {
 fn checks(job: &Job, shop: &Shop, result: &TileResult) -> Vec<String> {
     let tile = &result.tile;
     let depth_mm = tile.allowance_mm + tile.surface().top_mm() - tile.surface().bottom_mm();
-    let mut checks = vec![
-        format!(
-            "The blank is at least {:.2} mm thick: the deepest cut goes {depth_mm:.2} mm down and leaves {:.2} mm.",
-            job.stock.thickness_mm,
-            job.stock.thickness_mm - depth_mm
+    let mut checks = vec![format!(
+        "The blank is at least {:.2} mm thick: the deepest cut goes {depth_mm:.2} mm down and leaves {:.2} mm.",
+        job.stock.thickness_mm,
+        job.stock.thickness_mm - depth_mm
+    )];
+    let air = |program: &&Program| job.operations[program.operation].kind == Kind::Outline;
+    checks.push(match result.posts[0].programs.iter().find(air) {
+        Some(program) => format!(
+            "Run {} first: spindle off, {} mm above the blank, round the tile and then round all that is cut. Watch the clamps and the corners.",
+            program.file.display(),
+            // It only rises from the height that it runs at.
+            program.reading.motions.iter().filter(|motion| !motion.rapid() && motion.known()).map(|motion| motion.to_mm[2]).fold(f64::INFINITY, f64::min) + tile.z_zero_mm - tile.allowance_mm
         ),
-        "Run the first program with Z raised by its depth, spindle off, and watch the corners.".into(),
-    ];
+        None => "Run the first program with Z raised by its depth, spindle off, and watch the corners.".into(),
+    });
     let kind = |program: &&Program| job.operations[program.operation].kind == Kind::Rough;
     if let Some(rough) = result.posts[0].programs.iter().find(kind) {
         let operation = &job.operations[rough.operation];
@@ -273,7 +344,7 @@ fn limits(job: &Job, shop: &Shop, result: &TileResult) -> Vec<String> {
     }
     let steepest = result.tile.surface().steepest();
     for (operation, tool) in job.operations.iter().zip(&shop.tools) {
-        if operation.kind != Kind::Finish || operation.stock_to_leave_mm > 0.0 {
+        if !operation.finishes() {
             continue;
         }
         let Shape::Ball { diameter_mm } = tool.shape else { continue };

@@ -17,6 +17,8 @@ pub struct Shop {
     pub library: Library,
     /// One for each operation, with the job's feeds.
     pub tools: Vec<Tool>,
+    /// What each of them does.
+    pub kinds: Vec<job::Kind>,
     pub stock: Stock,
 }
 
@@ -56,7 +58,14 @@ impl Shop {
                 job::Blanks::One => crate::machine::Blanks::One,
             },
         };
-        Ok(Shop { machine, fixture, dialects, library, tools, stock })
+        let kinds = job.operations.iter().map(|operation| operation.kind).collect();
+        Ok(Shop { machine, fixture, dialects, library, tools, kinds, stock })
+    }
+
+    /// The tools that make the part's surface, not those for holes, marks and slots beside it.
+    pub fn shaping(&self) -> impl DoubleEndedIterator<Item = &Tool> + Clone {
+        let kinds = self.kinds.iter();
+        self.tools.iter().zip(kinds).filter(|(_, kind)| kind.shapes()).map(|(tool, _)| tool)
     }
 }
 

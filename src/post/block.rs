@@ -15,6 +15,8 @@ pub(super) struct Facts {
     pub rpm: i64,
     pub code: Option<u8>,
     pub by_hand: bool,
+    /// Whether it turns at all.
+    pub spindle: bool,
     pub spin_up_ms: i64,
     pub rapid_xy: String,
     pub rapid_z: String,
@@ -45,6 +47,7 @@ impl Facts {
             rpm => self.rpm,
             code => self.code.map_or(Value::from(()), Value::from),
             by_hand => self.by_hand,
+            spindle => self.spindle,
             spin_up_s => number(self.spin_up_ms, 3, Point::Fraction),
             spin_up_ms => self.spin_up_ms,
             rapid_xy => &self.rapid_xy,
@@ -73,6 +76,7 @@ impl Facts {
             first: ["1".into(), "2".into(), "500".into()],
             park: ["1".into(), "2".into()],
             rpm: 20_000,
+            spindle: true,
             spin_up_ms: 3000,
             rapid_xy: "30".into(),
             rapid_z: "15".into(),
@@ -84,6 +88,7 @@ impl Facts {
             Facts { code: Some(8), ..plain.clone() },
             Facts { by_hand: true, ..plain.clone() },
             Facts { tool_changer: true, ..plain.clone() },
+            Facts { spindle: false, ..plain.clone() },
             plain,
         ]
     }

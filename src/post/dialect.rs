@@ -208,7 +208,7 @@ pub struct Feed {
 /// Names: `wcs`, `clearance`, `x`, `y`, `z` (the first point), `park_x`, `park_y` (the back left
 /// corner of the program's motions), `rpm`, `code` (none on machines
 /// without), `by_hand`, `spin_up_s`, `spin_up_ms`, `rapid_xy`, `rapid_z` (feed words'
-/// numbers), `path_tolerance_mm`, `merge_tolerance_mm`, `tool_changer`, `tool_number`, `coolant_on`,
+/// numbers), `path_tolerance_mm`, `merge_tolerance_mm`, `spindle`, `tool_changer`, `tool_number`, `coolant_on`,
 /// `coolant_off` (none on machines without), `program_number`. Filters beside minijinja's own:
 /// `point` (3 becomes 3.0), `digits(n)` (leading zeros).
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]

@@ -45,6 +45,8 @@ pub struct Program<'a> {
     pub tool: &'a Tool,
     pub stock: &'a StockFacts,
     pub z_zero: ZZero,
+    /// Whether the spindle turns; false for a run in air.
+    pub spindle: bool,
     /// Work coordinate system, "G54" and the like; not named by dialects that have none.
     pub wcs: &'a str,
     /// z of the plane between passes, in the program's frame.

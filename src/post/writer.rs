@@ -202,12 +202,13 @@ impl<'a> Plan<'a> {
             rpm: tool.spindle_rpm.round() as i64,
             code: spindle.code,
             by_hand: spindle.by_hand,
+            spindle: program.spindle,
             spin_up_ms: (machine.spindle.spin_up_s * 1000.0).round() as i64,
             rapid_xy: spell(rapid_xy),
             rapid_z: spell(rapid_z),
             tool_changer: machine.tool_changer,
             tool_number: tool.number.unwrap_or(1),
-            coolant: dialect.coolant(machine),
+            coolant: dialect.coolant(machine).filter(|_| program.spindle),
             program_number: program.number,
         };
         Ok(plan)

@@ -97,6 +97,8 @@ pub struct SheetProgram {
     pub sha256: String,
     /// Set where the tool differs from the program before.
     pub re_zero_z: bool,
+    /// Set where the blank is turned over before it, in words.
+    pub turn: Option<String>,
 }
 
 /// The blank seen from above in a 420 x 300 drawing, y down.

@@ -6,7 +6,9 @@ use super::envelope::{Cutter, Envelope};
 use super::passes::{contact_radius_mm, tip_radius_mm};
 use super::pen::Pen;
 use super::strip::{Strip, band_length};
-use super::{Axis, Error, GridPoint, Layout, Progress, Site, Tilt, Toolpath, ends, funnel, link, slant};
+use super::{
+    Axis, Error, GridPoint, Layout, Progress, Rest, Site, Tilt, Toolpath, ends, funnel, link, slant,
+};
 use crate::cutter::Shape;
 use crate::tolerance::EXCESS_MM;
 
@@ -112,6 +114,32 @@ type Run = Vec<[i32; 2]>;
 /// The swept cutter stays at or above the samples plus `stock_to_leave_mm`, less the budget; every vertex is on
 /// the controller's grid. The same path whatever the number of threads.
 pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpath, Error> {
+    let path = passes(site, params, None, progress)?;
+    if path.moves.is_empty() {
+        let lattice = site.surface.lattice();
+        return Err(Error::NoData { samples: lattice.columns * lattice.rows });
+    }
+    Ok(path)
+}
+
+/// The passes of [`finish`] only where something was left; over gaps of up to `stay_mm` the cutter stays down. Without
+/// any move where nothing was left.
+pub fn rest(
+    site: &Site,
+    params: &Params,
+    rest: &Rest,
+    stay_mm: f64,
+    progress: Progress,
+) -> Result<Toolpath, Error> {
+    passes(site, params, Some((rest, stay_mm)), progress)
+}
+
+fn passes(
+    site: &Site,
+    params: &Params,
+    rest: Option<(&Rest, f64)>,
+    progress: Progress,
+) -> Result<Toolpath, Error> {
     let layout = layout(site, params)?;
     let lattice = site.surface.lattice();
     let cutter =
@@ -143,7 +171,10 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
         let planned: Vec<(Vec<Run>, Tilt)> = (first..last + 1)
             .into_par_iter()
             .zip(envelopes)
-            .map(|(k, envelope)| {
+            .map(|(k, mut envelope)| {
+                if let Some((rest, stay_mm)) = rest {
+                    rest.thin(&layout, k, stay_mm, &mut envelope.cl_mm);
+                }
                 let (mut runs, tilt) = pass(site, params, &layout, k, stepover_mm, &envelope);
                 if backwards(params.pattern, layout.along, k) {
                     runs.reverse();
@@ -202,9 +233,6 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
         first = last + 1;
         progress(first as f64 / passes as f64);
     }
-    if before.is_none() {
-        return Err(Error::NoData { samples: lattice.columns * lattice.rows });
-    }
     let mut path = pen.finish();
     // Positions of a slanted pass on a coarse grid stand so far to both sides of its line that their own heights
     // zigzag: no slope to compare with.
@@ -215,7 +243,7 @@ pub fn finish(site: &Site, params: &Params, progress: Progress) -> Result<Toolpa
 
 /// Whether a pass runs towards lower coordinates. Passes follow each other towards higher ones, so the
 /// uncut side of a pass along X is on the right when it runs to -X, of one along Y when it runs to +Y.
-fn backwards(pattern: Pattern, along: Axis, k: usize) -> bool {
+pub(super) fn backwards(pattern: Pattern, along: Axis, k: usize) -> bool {
     match pattern {
         Pattern::Zigzag => k % 2 == 1,
         Pattern::OneWay => along == Axis::X,

@@ -8,6 +8,7 @@
 //! Planning is in the tile's frame: X0 Y0 at its lower left corner, z = 0 at its highest design point. Only
 //! the last step, to whole units, moves z to the program's zero.
 
+pub mod beside;
 mod ends;
 mod envelope;
 pub mod finish;
@@ -16,12 +17,15 @@ mod levels;
 mod link;
 mod passes;
 mod pen;
+mod rest;
 pub mod rough;
 mod slant;
 mod strip;
 mod tilt;
 
 pub use passes::{Axis, Layout};
+pub use pen::APPROACH_MM;
+pub use rest::Rest;
 pub use tilt::{Tilt, Worst};
 
 use crate::compensation;
@@ -142,6 +146,32 @@ pub enum Error {
         "one band of passes needs {samples} samples in memory, at most {most} are held; hint: smaller tiles, or a larger step_mm"
     )]
     Band { samples: usize, most: usize },
+    #[error("the hole of {diameter_mm} mm at X {:.3} Y {:.3} {problem}; hint: {hint}", .at_mm[0], .at_mm[1])]
+    Hole { diameter_mm: f64, at_mm: [f64; 2], problem: String, hint: &'static str },
+    #[error(
+        "a hole of {diameter_mm} mm cannot be cut by {cutter}; hint: its own diameter up to twice that, {least_mm} .. {most_mm} mm"
+    )]
+    Bore { diameter_mm: f64, cutter: String, least_mm: f64, most_mm: f64 },
+    #[error(
+        "it goes {depth_mm:.3} mm deep, the blank and what may be cut under it are {most_mm:.3} mm; hint: a smaller depth_mm or through_mm, or a fixture with a board to cut into (sacrificial_mm)"
+    )]
+    Deep { depth_mm: f64, most_mm: f64 },
+    #[error(
+        "the slot of {cutter} takes {needed_mm:.3} mm around the tile and tabs need metal past it, margin_mm is {margin_mm}; hint: more margin_mm, a thinner cutter, or tabs = 0 where the blank is held all over"
+    )]
+    Slot { cutter: String, needed_mm: f64, margin_mm: f64 },
+    #[error(
+        "{tabs} tabs of {width_mm} mm with the cutter's way around them take {needed_mm:.3} mm of a side of {side_mm:.3} mm; hint: fewer tabs, or a smaller tab_width_mm"
+    )]
+    Tabs { tabs: u32, width_mm: f64, needed_mm: f64, side_mm: f64 },
+    #[error(
+        "tabs of {height_mm} mm are no lower than the cut of {depth_mm:.3} mm is deep; hint: a smaller tab_height_mm, or no cut-out"
+    )]
+    TabHeight { height_mm: f64, depth_mm: f64 },
+    #[error(
+        "the mark \"{text}\" with its cutter takes {needed_mm:.3} mm, there are {room_mm:.3} mm {place}; hint: a smaller height_mm, a finer cutter or more margin_mm"
+    )]
+    Mark { text: String, needed_mm: f64, room_mm: f64, place: &'static str },
     #[error(transparent)]
     Compensation(#[from] compensation::Error),
     #[error(transparent)]
@@ -179,6 +209,12 @@ impl Site<'_> {
             return Err(Error::Grid { reach_mm: farthest_mm, unit_mm: self.unit_mm, limit_mm });
         }
         Ok(())
+    }
+
+    /// A place of the tile's frame on the nearest point of the controller's grid.
+    fn nearest(&self, xy_mm: [f64; 2], z_mm: f64) -> GridPoint {
+        let units = |mm: f64| (mm / self.unit_mm).round() as i32;
+        [units(xy_mm[0]), units(xy_mm[1]), self.unit_above(z_mm)]
     }
 
     /// A height of the tile's frame in units of the program's, not yet rounded.

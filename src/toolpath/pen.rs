@@ -3,7 +3,10 @@
 use super::{GridPoint, Kind, Move, Retract, Site, Toolpath};
 
 /// Rapids stop this far above what may stand below them, in mm.
-const APPROACH_MM: f64 = 0.5;
+pub const APPROACH_MM: f64 = 0.5;
+
+/// After a peck the cutter comes down to this far above the hole's bottom, in mm.
+const PECK_MM: f64 = 0.1;
 
 /// A link on the retract plane keeps this far from clamps, in mm.
 const SPARE_MM: f64 = 1.0;
@@ -83,6 +86,14 @@ impl<'a> Pen<'a> {
         };
         let near = plane.guard.meets(place(at), place(to), SPARE_MM);
         if near { self.clearance } else { retract.min(self.clearance) }
+    }
+
+    /// Straight up to above what stood here, to clear the chips, and down again to just above where the cutter was.
+    pub(super) fn peck(&mut self) {
+        let Some(at) = self.at else { return };
+        self.go(Kind::Rapid, [at[0], at[1], self.top + self.approach]);
+        let gap = ((PECK_MM * f64::from(self.approach) / APPROACH_MM).ceil() as i32).max(1);
+        self.go(Kind::Rapid, [at[0], at[1], (at[2] + gap).min(self.top + self.approach)]);
     }
 
     /// A straight cut; straight down it is a plunge.

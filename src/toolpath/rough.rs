@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::envelope::{Cutter, Envelope};
+use super::finish::{Pattern, backwards};
 use super::levels::{self, Profile};
 use super::pen::Pen;
 use super::strip::{Border, Strip, band_length};
@@ -34,6 +35,8 @@ pub struct Params {
     pub stock_to_leave_mm: f64,
     /// 0: rows along X, 90: along Y.
     pub direction_deg: f64,
+    /// One way: every cut climbs, and begins anew.
+    pub pattern: Pattern,
     /// Metal around the part that later cutters need out of the way: their overrun plus their radius.
     pub clear_mm: f64,
 }
@@ -225,10 +228,17 @@ fn cut_level(site: &Site, params: &Params, plan: &Plan, above: i32, level: i32, 
         for nth in 0..rows[first].len() {
             let Some(mut cut) = rows[first][nth].take() else { continue };
             let mut k = first;
+            let climbs = params.pattern == Pattern::OneWay;
+            if climbs && backwards(params.pattern, plan.layout.along, k) {
+                cut.reverse();
+            }
             pen.begin(point(cut[0][0], plan.rows[k].across, cut[0][1]), above);
             loop {
                 for &[u, z] in &cut[1..] {
                     pen.cut(point(u, plan.rows[k].across, z));
+                }
+                if climbs {
+                    break;
                 }
                 let Some((at, next)) = follow(site, params, plan, k + 1, &cut, &mut rows, above) else {
                     break;

@@ -178,6 +178,7 @@ pub fn setup_sheet() -> SetupSheet {
         time_s,
         bounds_mm: bounds(),
         sha256: "ab".repeat(32),
+        turn: None,
         re_zero_z: true,
     };
     let words = |line: &str| vec![line.to_string()];
