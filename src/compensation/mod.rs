@@ -17,6 +17,7 @@
 
 mod ball;
 mod blocks;
+mod bounded;
 mod brute;
 mod chord;
 mod contact;

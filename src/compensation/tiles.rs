@@ -2,7 +2,7 @@ use super::field::{Field, Sense, Targets};
 use super::memory::large_pages;
 use super::pairs::{OnSamples, Pairs};
 use super::stencil::Stencil;
-use super::{Profile, brute, chord, contact};
+use super::{Profile, bounded, brute, chord, contact};
 use crate::grid::{Heights, Window};
 use rayon::prelude::*;
 
@@ -139,7 +139,7 @@ fn tile_on_samples(
     dilate_by(field, &pairs, profile, targets, way);
 }
 
-/// How contacts of a ball are found.
+/// How contacts are found; only balls have more than two ways.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
@@ -168,8 +168,14 @@ fn dilate_by<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, targets: &mu
         let most = if way == Way::Contacts { f64::INFINITY } else { brute::work(profile, targets) };
         contact::contacts(field, pairs, profile, targets, most, &mut given_up);
     }
-    if given_up {
+    if !given_up {
+        return;
+    }
+    // Where looking for a ball's contacts is too much work, maxima leave nothing out either.
+    if profile.is_ball() || profile.radius() < bounded::LEAST_RADIUS || way == Way::EveryTap {
         brute::every_tap(field, pairs, chords, targets);
+    } else {
+        bounded::bounded(field, pairs, chords, targets);
     }
 }
 
@@ -222,7 +228,7 @@ mod tests {
                     chord::body::<V, _>(&field, &pairs, targets, plateau + 1.0);
                 }
                 if plateau < profile.radius() {
-                    brute::body::<V, _>(&field, &pairs, plateau > 0.0, targets);
+                    bounded::body::<V, _>(&field, &pairs, plateau > 0.0, targets);
                 }
             })
         };
@@ -240,6 +246,7 @@ mod tests {
                 "bull:0.4:0.1",
                 "vee:60:0:0.3",
                 "taper:0.2:10:0.3",
+                "vee:120:0:0.8",
             ];
             for cutter in cutters {
                 let [portable, pruned] = bits::<Portable>(h, cutter);
