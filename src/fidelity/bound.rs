@@ -5,7 +5,9 @@ use crate::cutter::Shape;
 use crate::grid::{Heights, Window};
 
 /// Samples along the side of a block.
-const BLOCK: i64 = 16;
+const BLOCK: i64 = 8;
+/// Blocks along the side of a piece that is looked at by itself.
+const PIECE: i64 = 16;
 /// More than the rounding of heights as floats, in mm; a flat's are not rounded at all.
 const ROUNDED_MM: f64 = 1e-5;
 
@@ -18,16 +20,15 @@ pub struct Peaks {
 
 impl Peaks {
     /// Looks over heights.
-    pub fn new(heights: &Heights) -> Peaks {
+    pub fn of(heights: &Heights) -> Peaks {
         let window = heights.window;
         let blocks = blocks(window);
         let mut z_mm = vec![f32::NEG_INFINITY; blocks.samples()];
         for row in window.row..window.row_end() {
-            let start = (row.div_euclid(BLOCK) - blocks.row) as usize * blocks.columns;
-            let peaks = &mut z_mm[start..start + blocks.columns];
             let line = heights.row(row);
+            let start = (row.div_euclid(BLOCK) - blocks.row) as usize * blocks.columns;
             let mut at = window.column;
-            for peak in peaks {
+            for peak in &mut z_mm[start..start + blocks.columns] {
                 let end = ((at.div_euclid(BLOCK) + 1) * BLOCK).min(window.column_end());
                 let part = &line[(at - window.column) as usize..(end - window.column) as usize];
                 *peak = part.iter().fold(*peak, |most, z| higher(most, *z));
@@ -37,44 +38,30 @@ impl Peaks {
         Peaks { blocks, z_mm }
     }
 
-    /// Where in a window a cutter's closing could be lower than `lowest`: a window that holds all such samples. The
-    /// heights looked over should reach as far around as those that the closing would be made from.
-    pub fn lower_within(&self, shape: &Shape, step_mm: f64, lowest: &Heights) -> Option<Window> {
+    /// Where a cutter's closing could be lower than `lowest`, a closing of `design` in the same window: windows that
+    /// hold all such samples. The heights looked over should reach as far around as those that the closing would be
+    /// made from.
+    pub fn lower_within(
+        &self,
+        shape: &Shape,
+        step_mm: f64,
+        lowest: &Heights,
+        design: &Heights,
+    ) -> Vec<Window> {
         let wanted = blocks(lowest.window);
         let reach = (shape.radius_mm() / (BLOCK as f64 * step_mm)).ceil() as i64 + 1;
         let standing = self.standing(shape, step_mm, wanted.grown(reach as usize), reach);
         let least = eroded(shape, step_mm, &standing, wanted, reach);
-        let mut found: Option<[i64; 4]> = None;
-        for row in wanted.row..wanted.row_end() {
-            for column in wanted.column..wanted.column_end() {
-                let block = Window {
-                    column: column * BLOCK,
-                    row: row * BLOCK,
-                    columns: BLOCK as usize,
-                    rows: BLOCK as usize,
-                };
-                let Some(part) = lowest.window.intersection(&block) else { continue };
-                let bound = least.z_mm
-                    [(row - wanted.row) as usize * wanted.columns + (column - wanted.column) as usize];
-                let most = (part.row..part.row_end()).map(|row| {
-                    let from = (part.column - lowest.window.column) as usize;
-                    let line = &lowest.row(row)[from..from + part.columns];
-                    line.iter().fold(f32::NEG_INFINITY, |most, z| higher(most, *z))
-                });
-                if most.fold(f32::NEG_INFINITY, f32::max) > bound {
-                    let ends = [part.column, part.row, part.column_end(), part.row_end()];
-                    found = Some(found.map_or(ends, |f| {
-                        [f[0].min(ends[0]), f[1].min(ends[1]), f[2].max(ends[2]), f[3].max(ends[3])]
-                    }));
-                }
+        let mut found = Vec::new();
+        for row in (wanted.row..wanted.row_end()).step_by(PIECE as usize) {
+            for column in (wanted.column..wanted.column_end()).step_by(PIECE as usize) {
+                let side = PIECE as usize;
+                let piece = Window { column, row, columns: side, rows: side };
+                let Some(piece) = wanted.intersection(&piece) else { continue };
+                found.extend(lower(&least, piece, lowest, design));
             }
         }
-        found.map(|[column, row, column_end, row_end]| Window {
-            column,
-            row,
-            columns: (column_end - column) as usize,
-            rows: (row_end - row) as usize,
-        })
+        found
     }
 
     /// The lowest that the cutter could stand at any sample of each block.
@@ -110,6 +97,42 @@ impl Peaks {
         );
         standing
     }
+}
+
+/// The samples of some blocks at which `lowest` stands above both the design and the least of its block.
+fn lower(least: &Heights, blocks: Window, lowest: &Heights, design: &Heights) -> Option<Window> {
+    let mut found: Option<[i64; 4]> = None;
+    for row in blocks.row..blocks.row_end() {
+        for column in blocks.column..blocks.column_end() {
+            let side = BLOCK as usize;
+            let block = Window { column: column * BLOCK, row: row * BLOCK, columns: side, rows: side };
+            let Some(part) = lowest.window.intersection(&block) else { continue };
+            let bound = least.row(row)[(column - least.window.column) as usize];
+            let from = (part.column - lowest.window.column) as usize;
+            let cut = |heights: &'_ Heights, row| -> [f32; BLOCK as usize] {
+                let mut line = [f32::NEG_INFINITY; BLOCK as usize];
+                line[..part.columns].copy_from_slice(&heights.row(row)[from..from + part.columns]);
+                line
+            };
+            let could = (part.row..part.row_end()).any(|row| {
+                let (lowest, design) = (cut(lowest, row), cut(design, row));
+                lowest.iter().zip(&design).any(|(z, design)| z > design && *z > bound)
+            });
+            if could {
+                let ends = [part.column, part.row, part.column_end(), part.row_end()];
+                let all = |f: [i64; 4]| {
+                    [f[0].min(ends[0]), f[1].min(ends[1]), f[2].max(ends[2]), f[3].max(ends[3])]
+                };
+                found = Some(found.map_or(ends, all));
+            }
+        }
+    }
+    found.map(|[column, row, column_end, row_end]| Window {
+        column,
+        row,
+        columns: (column_end - column) as usize,
+        rows: (row_end - row) as usize,
+    })
 }
 
 /// The lowest that a cutter which stands no lower than this leaves of any sample of each block.
@@ -202,7 +225,7 @@ mod tests {
     #[test]
     fn where_it_says_that_a_cutter_gets_no_lower_it_does_not() {
         let around = relief(Window { column: -37, row: 11, columns: 300, rows: 240 });
-        let peaks = Peaks::new(&around);
+        let peaks = Peaks::of(&around);
         let mut spared = 0;
         for (name, other) in [
             ("flat:1", "ball:0.4"),
@@ -220,18 +243,17 @@ mod tests {
                 columns: inner.columns - 4 * reach as usize,
                 rows: inner.rows - 4 * reach as usize,
             };
-            let (mut lowest, closed) = (closing(&around, &known, inner), closing(&around, &tried, inner));
-            for (z, design) in lowest.z_mm.iter_mut().zip(&around.crop(inner).z_mm) {
-                *z = if design.is_nan() { f32::NAN } else { *z };
-            }
-            let within = peaks.lower_within(&shapes[0], STEP_MM, &lowest);
+            let (lowest, closed) = (closing(&around, &known, inner), closing(&around, &tried, inner));
+            let design = around.crop(inner);
+            let within = peaks.lower_within(&shapes[0], STEP_MM, &lowest, &design);
             for row in inner.row..inner.row_end() {
-                for (k, (a, b)) in closed.row(row).iter().zip(lowest.row(row)).enumerate() {
-                    let column = inner.column + k as i64;
-                    let inside = within.is_some_and(|w| {
+                let lines = closed.row(row).iter().zip(lowest.row(row)).zip(design.row(row));
+                for (column, ((a, b), z)) in (inner.column..).zip(lines) {
+                    let inside = within.iter().any(|w| {
                         (w.column..w.column_end()).contains(&column) && (w.row..w.row_end()).contains(&row)
                     });
-                    assert!(inside || b.is_nan() || a >= b, "{name} at {column}, {row}: {a} under {b}");
+                    let lower = a < b && b > z;
+                    assert!(inside || !lower, "{name} at {column}, {row}: {a} under {b}, design {z}");
                     spared += u32::from(!inside);
                 }
             }
@@ -245,6 +267,14 @@ mod tests {
         let floor = Heights { window, z_mm: vec![-1.0; window.samples()] };
         let inner = Window { column: 150, row: 150, columns: 100, rows: 100 };
         let flat = "flat:2".parse().expect("a cutter");
-        assert_eq!(Peaks::new(&floor).lower_within(&flat, STEP_MM, &floor.crop(inner)), None);
+        let mut lowest = floor.crop(inner);
+        let design = lowest.clone();
+        let peaks = Peaks::of(&floor);
+        assert!(peaks.lower_within(&flat, STEP_MM, &lowest, &design).is_empty());
+        // Nor where something else stands in the way, but where the other cutter leaves more than this one would.
+        lowest.z_mm[50 * 100 + 50] = -0.9;
+        let within = peaks.lower_within(&flat, STEP_MM, &lowest, &design);
+        let one = Window { column: 200, row: 200, columns: 8, rows: 8 };
+        assert_eq!(within, [one]);
     }
 }

@@ -100,9 +100,14 @@ pub fn check(
     let mut smallest_set = None;
     let mut best: Vec<usize> = usable.clone();
     for set in sets(&usable, &masks).into_iter().take(TRIED_SETS) {
-        progress.begin("sets of cutters", job_facts.samples());
-        let (measured, ..) = job_facts.measure(std::slice::from_ref(&set), progress)?;
-        let reach = job_facts.reach(&set, &measured[0], &designed);
+        let reach = match set[..] {
+            [index] => job_facts.reach(&set, &measured[index], &designed),
+            _ => {
+                progress.begin("sets of cutters", job_facts.samples());
+                let (together, ..) = job_facts.measure(std::slice::from_ref(&set), progress)?;
+                job_facts.reach(&set, &together[0], &designed)
+            }
+        };
         if keeps(job, &reach) {
             best = set;
             smallest_set = Some(reach);

@@ -17,6 +17,8 @@ use crate::verify::{self, Blank, Judged, ProgramCut};
 
 const BLOCK_COLUMNS: usize = 2048;
 const BLOCK_ROWS: usize = 1024;
+/// Rows that are handed on together.
+const STRIP_ROWS: usize = 128;
 
 /// The passes of a finishing operation that leaves no stock.
 pub struct ExactPasses {
@@ -81,7 +83,7 @@ impl Pictures {
     }
 }
 
-/// A row of blocks of the tile, lowest first, as the first post cuts it.
+/// Some rows of the tile, lowest first, as the first post cuts it.
 pub struct Strip {
     pub design: Heights,
     pub machined: Heights,
@@ -101,7 +103,7 @@ struct Block {
     pictures: Pictures,
 }
 
-/// Judges a tile; `each` receives its rows of blocks from the lowest y up.
+/// Judges a tile; `each` receives its rows from the lowest y up.
 pub fn judge(
     case: &Case,
     progress: &dyn Progress,
@@ -129,16 +131,8 @@ pub fn judge(
                 block
             })
             .collect::<Result<_, Error>>()?;
-        let window = Window { column: 0, columns: lattice.columns, ..row[0] };
-        let mut strip = Strip {
-            design: Heights::empty(window),
-            machined: Heights::empty(window),
-            cavity: Heights::empty(window),
-        };
+        let mut layers = Vec::new();
         for block in blocks {
-            paste(&mut strip.design, &block.design);
-            paste(&mut strip.machined, &block.machined);
-            paste(&mut strip.cavity, &block.cavity);
             for (sum, tally) in tallies.iter_mut().zip(&block.tallies) {
                 sum.merge(tally);
             }
@@ -152,8 +146,19 @@ pub fn judge(
             light_polished.merge(&block.light_polished);
             pictures.merge(&block.pictures);
             cavities.add(block.labelled)?;
+            layers.push([block.design, block.machined, block.cavity]);
         }
-        each(strip)?;
+        // A few rows at a time: a copy of all would be as much as the blocks themselves.
+        for first in (0..row[0].rows).step_by(STRIP_ROWS) {
+            let rows = STRIP_ROWS.min(row[0].rows - first);
+            let window = Window { column: 0, row: row[0].row + first as i64, columns: lattice.columns, rows };
+            let [design, machined, cavity] = std::array::from_fn(|layer| {
+                let mut strip = Heights::empty(window);
+                layers.iter().for_each(|layers| paste(&mut strip, &layers[layer]));
+                strip
+            });
+            each(Strip { design, machined, cavity })?;
+        }
     }
     Ok(Verdict {
         tallies,
@@ -182,9 +187,10 @@ pub fn blocks(lattice: &Lattice) -> Vec<Vec<Window>> {
         .collect()
 }
 
+/// Copies the rows of a block that a strip of the tile has.
 fn paste(strip: &mut Heights, block: &Heights) {
     let columns = strip.window.columns;
-    for row in block.window.row..block.window.row_end() {
+    for row in strip.window.row..strip.window.row_end() {
         let start = (row - strip.window.row) as usize * columns + block.window.column as usize;
         strip.z_mm[start..start + block.window.columns].copy_from_slice(block.row(row));
     }
@@ -283,10 +289,11 @@ impl Case<'_> {
         cutters.sort_by(|a, b| a.radius_mm().total_cmp(&b.radius_mm()));
         let Some((smallest, others)) = cutters.split_first() else { return Heights::empty(design.window) };
         let mut lowest = compensation::closing(around, smallest, design.window);
-        let peaks = (!others.is_empty()).then(|| Peaks::new(around));
-        for (profile, peaks) in others.iter().zip(peaks.iter().cycle()) {
+        let mut peaks = None;
+        for profile in others {
+            let peaks = peaks.get_or_insert_with(|| Peaks::of(around));
             let step_mm = self.surface.lattice().step_mm;
-            if let Some(within) = peaks.lower_within(&profile.shape(), step_mm, &lowest) {
+            for within in peaks.lower_within(&profile.shape(), step_mm, &lowest, design) {
                 lower(&mut lowest, &compensation::closing(around, profile, within));
             }
         }

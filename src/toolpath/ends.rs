@@ -42,6 +42,20 @@ struct State {
     from: (u32, u8),
 }
 
+/// What a position asks of the moves that come by.
+#[derive(Clone, Copy)]
+struct Position {
+    w: f64,
+    g: f64,
+    exact: f64,
+    low: f64,
+    high: f64,
+    /// 1 over its distance from the first.
+    part: f64,
+    /// First and one past the last of its states.
+    states: [usize; 2],
+}
+
 /// Sums over the positions behind a state, d positions away and q above it.
 #[derive(Clone, Copy, Default)]
 struct Sums {
@@ -84,36 +98,54 @@ pub(super) fn lay(low: &[f64], high: &[f64], exact: &[f64], measure: &Measure) -
         }
     }
     starts.push(states.len());
+    let positions: Vec<Position> = (1..count)
+        .map(|j| Position {
+            w: weights[j],
+            g: exact[j] - exact[j - 1],
+            exact: exact[j],
+            low: low[j],
+            high: high[j],
+            part: 1.0 / j as f64,
+            states: [starts[j], starts[j + 1]],
+        })
+        .collect();
     for i in 0..last {
         for nth in starts[i]..starts[i + 1] {
             let State { z, cost, .. } = states[nth];
             let z = f64::from(z);
+            // No move from here costs less than this.
+            let at_least = cost + block;
             let (mut least, mut most) = (f64::NEG_INFINITY, f64::INFINITY);
             let mut sums = Sums::default();
-            for j in i + 1..=last {
-                let d = (j - i) as f64;
-                let (w, g, q) = (weights[j], exact[j] - exact[j - 1], exact[j] - z);
+            let mut d = 0.0;
+            for (position, distance) in positions[i..].iter().zip(&positions) {
+                d += 1.0;
+                let Position { w, g, exact, low, high, states: [first, end], .. } = *position;
+                let q = exact - z;
                 sums.w += w;
                 sums.wd2 += w * d * d;
                 sums.wdq += w * d * q;
                 sums.wq2 += w * q * q;
                 sums.wg += w * g;
                 sums.wg2 += w * g * g;
-                let part = 1.0 / d;
-                for state in &mut states[starts[j]..starts[j + 1]] {
+                let part = distance.part;
+                for state in &mut states[first..end] {
+                    if at_least >= state.cost {
+                        continue;
+                    }
                     let s = (f64::from(state.z) - z) * part;
                     if s < least || s > most {
                         continue;
                     }
                     let turned = s * s * sums.w - 2.0 * s * sums.wg + sums.wg2;
                     let raised = s * s * sums.wd2 - 2.0 * s * sums.wdq + sums.wq2;
-                    let cost = cost + block + slope_cost * turned.max(0.0) + height_cost * raised.max(0.0);
+                    let cost = at_least + slope_cost * turned.max(0.0) + height_cost * raised.max(0.0);
                     if cost < state.cost {
                         *state = State { cost, from: (i as u32, (nth - starts[i]) as u8), ..*state };
                     }
                 }
-                least = least.max((low[j] - z) * part);
-                most = most.min((high[j] - z) * part);
+                least = least.max((low - z) * part);
+                most = most.min((high - z) * part);
                 if least > most {
                     break;
                 }

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::super::contact::Contact;
-use super::above::{Above, GROUP};
+use super::above::{Above, GROUP, lanes};
 use super::band::Band;
 use super::bite::Watch;
 use super::leg::Leg;
@@ -226,21 +226,16 @@ impl Band<'_> {
                 let Some(ramp) = lines.ramp[column..].first_chunk::<GROUP>() else { break };
                 let Some(x_mm) = self.x_mm[column..].first_chunk::<GROUP>() else { break };
                 let before = *z;
-                for k in 0..GROUP {
-                    let new = if body.contains(&((column + k) as i32)) {
-                        (level + ramp[k]) as f32
-                    } else {
-                        f32::INFINITY
-                    };
-                    z[k] = if new < z[k] { new } else { z[k] };
-                }
-                if (column as i32) < cap.end && (column + GROUP) as i32 > cap.start {
+                let here = column as i32;
+                V::lower(z, &V::line(level, ramp), lanes(body.start, body.end, here));
+                let corner = lanes(cap.start, cap.end, here);
+                if corner != 0 {
+                    let mut new = [0.0; GROUP];
                     for k in 0..GROUP {
                         let w = x_mm[k] - leg.to[0];
-                        let new = (leg.to[2] + contact.rise(lines.d2[i] + w * w)) as f32;
-                        let new = if cap.contains(&((column + k) as i32)) { new } else { f32::INFINITY };
-                        z[k] = if new < z[k] { new } else { z[k] };
+                        new[k] = (leg.to[2] + contact.rise(lines.d2[i] + w * w)) as f32;
                     }
+                    V::lower(z, &new, corner);
                 }
                 watch.group::<V>(&before, z, motion, (row, column), true);
             }
@@ -279,17 +274,22 @@ impl Band<'_> {
                 if V::above(z, low, over) == 0 {
                     continue;
                 }
+                let meant = lanes(meant.start as i32, meant.end as i32, at as i32);
                 let before = *z;
-                for k in 0..GROUP {
-                    let i = at + k;
-                    let cut = |[first, end]: &[[i32; LINES]; 2]| {
-                        low[k] < f32::INFINITY && first[i] <= here && here < end[i]
-                    };
-                    let body = if cut(&lines.body) { (lines.level[i] + ramp) as f32 } else { f32::INFINITY };
-                    let corner = (leg.to[2] + contact.rise(lines.d2[i] + w * w)) as f32;
-                    let corner = if cut(&lines.cap) { corner } else { f32::INFINITY };
-                    let new = if corner < body { corner } else { body };
-                    z[k] = if new < z[k] { new } else { z[k] };
+                let cut = |[first, end]: &[[i32; LINES]; 2]| -> u16 {
+                    let ranges = (first[at..].first_chunk::<GROUP>(), end[at..].first_chunk::<GROUP>());
+                    let (Some(first), Some(end)) = ranges else { return 0 };
+                    V::holding(first, end, here) & meant
+                };
+                let Some(level) = lines.level[at..].first_chunk::<GROUP>() else { break };
+                V::lower(z, &V::line(ramp, level), cut(&lines.body));
+                let corner = cut(&lines.cap);
+                if corner != 0 {
+                    let mut new = [0.0; GROUP];
+                    for (new, d2) in new.iter_mut().zip(&lines.d2[at..]) {
+                        *new = (leg.to[2] + contact.rise(d2 + w * w)) as f32;
+                    }
+                    V::lower(z, &new, corner);
                 }
                 watch.group::<V>(&before, z, motion, (row, column), false);
             }

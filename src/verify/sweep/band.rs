@@ -9,6 +9,9 @@ use super::leg::{Leg, Lie};
 use super::{OVERLAP_MM, REACH_MM};
 use crate::grid::Window;
 
+/// More than the rounding of a height in mm.
+const ROUNDED_MM: f64 = 1e-6;
+
 pub(super) struct Band<'a> {
     pub z_mm: &'a mut [f32],
     /// Places of the samples, and of some past the last.
@@ -33,6 +36,9 @@ impl Band<'_> {
         let apart =
             |l: [f64; 2], h: [f64; 2]| h[0] < low[0] || l[0] > high[0] || h[1] < low[1] || l[1] > high[1];
         let mut lines = Lines::new(columns, rows);
+        // No sample stands higher now or later, and no cutter is lower than its tip.
+        let top = self.z_mm.iter().fold(f32::NEG_INFINITY, |most, z| if *z > most { *z } else { most });
+        let top = f64::from(top) + ROUNDED_MM;
         for (chunk, bounds) in judged.chunks.iter().enumerate() {
             if apart(bounds[0], bounds[1]) {
                 continue;
@@ -48,7 +54,7 @@ impl Band<'_> {
                 let Some(this) = this else { continue };
                 let l = [this.from[0].min(this.to[0]), this.from[1].min(this.to[1])];
                 let h = [this.from[0].max(this.to[0]), this.from[1].max(this.to[1])];
-                if apart(l, h) {
+                if apart(l, h) || this.from[2].min(this.to[2]) > top {
                     continue;
                 }
                 let watch = &mut watches[this.class as usize];
