@@ -138,6 +138,8 @@ fn print(lit: &Lit) {
         gain_machined,
         uniformity_designed,
         uniformity_machined,
+        screen_uniformity_designed,
+        screen_uniformity_machined,
         ..
     } = lit.light;
     println!("{:<22} {:>10} {:>10}", "of the incident light", "design", "as cut");
@@ -149,9 +151,11 @@ fn print(lit: &Lit) {
     ] {
         println!("{name:<22} {:>8.3} % {:>8.3} %", 100.0 * before, 100.0 * after);
     }
-    for (name, before, after) in
-        [("gain", gain_designed, gain_machined), ("uniformity", uniformity_designed, uniformity_machined)]
-    {
+    for (name, before, after) in [
+        ("gain", gain_designed, gain_machined),
+        ("uniformity, audience", uniformity_designed, uniformity_machined),
+        ("uniformity, screen", screen_uniformity_designed, screen_uniformity_machined),
+    ] {
         if let (Some(before), Some(after)) = (before, after) {
             println!("{name:<22} {before:>10.3} {after:>10.3}");
         }

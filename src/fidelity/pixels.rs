@@ -89,6 +89,20 @@ impl Pixels {
         [self.sums.iter().sum(), self.weights.iter().sum()]
     }
 
+    /// The means over squares of `samples` along each side, each of the pixels whose middle lies in it, where there are
+    /// any.
+    pub fn means_of_squares(&self, samples: usize) -> Vec<f64> {
+        let square = |pixel: usize| (pixel * self.factor + self.factor / 2) / samples.max(1);
+        let across = square(self.columns.saturating_sub(1)) + 1;
+        let mut squares = vec![[0.0; 2]; across * (square(self.rows.saturating_sub(1)) + 1)];
+        for (index, (sum, weight)) in self.sums.iter().zip(&self.weights).enumerate() {
+            let (column, row) = (index % self.columns, index / self.columns);
+            let found = &mut squares[square(row) * across + square(column)];
+            *found = [found[0] + sum, found[1] + weight];
+        }
+        squares.iter().filter(|[_, weight]| *weight > 0.0).map(|[sum, weight]| sum / weight).collect()
+    }
+
     /// The mean of every pixel by row, lowest y first; NaN where there is nothing.
     pub fn means(&self) -> Vec<f64> {
         self.sums.iter().zip(&self.weights).map(|(sum, weight)| sum / weight).collect()
@@ -125,5 +139,14 @@ mod tests {
         assert_eq!(at_once, pieced);
         assert_eq!(at_once.means()[0], (0..16).map(|k| value(k % 4, k / 4)).sum::<f64>() / 16.0);
         assert_eq!(at_once.total()[1], 103.0 * 57.0);
+        // Pixels of 4 samples in squares of 52: 13 of them to the first, and as many to the second.
+        let squares = at_once.means_of_squares(52);
+        let mean = |columns: std::ops::Range<i64>, rows: std::ops::Range<i64>| {
+            let count = ((columns.end - columns.start) * (rows.end - rows.start)) as f64;
+            rows.flat_map(|r| columns.clone().map(move |c| value(c, r))).sum::<f64>() / count
+        };
+        assert_eq!(squares.len(), 4);
+        assert!((squares[0] - mean(0..52, 0..52)).abs() < 1e-9);
+        assert!((squares[3] - mean(52..103, 52..57)).abs() < 1e-9);
     }
 }

@@ -110,11 +110,24 @@ pub fn summary(designed: &LightTally, machined: &LightTally, view: &View) -> Opt
         gain_machined: machined.gain(view),
         uniformity_designed: designed.uniformity(view),
         uniformity_machined: machined.uniformity(view),
+        screen_uniformity_designed: None,
+        screen_uniformity_machined: None,
         shadowed_designed: designed.shadowed_fraction(),
         shadowed_machined: machined.shadowed_fraction(),
         standard_error: machined.standard_error(),
         polished: None,
     })
+}
+
+/// 1 - standard deviation / mean, over the screen's cells, of the part of their light that reaches the audience: from maps
+/// of tiles, as samples of `step_mm`.
+pub fn over_screen<'a>(scene: &Scene, maps: impl Iterator<Item = &'a Pixels>, step_mm: f64) -> Option<f64> {
+    let samples = (scene.microgeometry.width_mm / step_mm).round() as usize;
+    let shares: Vec<f64> = maps.flat_map(|map| map.means_of_squares(samples)).collect();
+    let count = shares.len() as f64;
+    let mean = shares.iter().sum::<f64>() / count;
+    let variance = shares.iter().map(|share| (share - mean).powi(2)).sum::<f64>() / count;
+    (shares.len() > 1 && mean > 0.0).then(|| 1.0 - variance.sqrt() / mean)
 }
 
 /// The figures of a polished cut.

@@ -252,6 +252,12 @@ fn of_light(
     let view = light::view(scene, &points);
     let mut light = light::summary(&designed, &machined, &view);
     if let Some(light) = &mut light {
+        let over_screen = |which: usize| {
+            let maps = results.iter().filter_map(|result| result.verdict.pictures.light.as_ref());
+            light::over_screen(scene, maps.map(|maps| &maps[which]), job.part.step_mm)
+        };
+        light.screen_uniformity_designed = over_screen(0);
+        light.screen_uniformity_machined = over_screen(1);
         light.polished =
             job.polish.and_then(|polish| light::polished(&polished, 1e-3 * polish.removal_um, &view));
         let middle_m = points.iter().sum::<glam::DVec3>() / points.len() as f64;

@@ -87,7 +87,12 @@ pub fn key_figures(report: &Report, limits: &Limits) -> Vec<KeyFigure> {
         figures.push(limited("Light on the audience", value, now, limits.on_audience_min, false, percent));
         let pairs = [
             ("Gain", light.gain_machined, light.gain_designed),
-            ("Uniformity", light.uniformity_machined, light.uniformity_designed),
+            ("Uniformity over the audience", light.uniformity_machined, light.uniformity_designed),
+            (
+                "Uniformity over the screen",
+                light.screen_uniformity_machined,
+                light.screen_uniformity_designed,
+            ),
         ];
         for (label, machined, designed) in pairs {
             if let (Some(machined), Some(designed)) = (machined, designed) {

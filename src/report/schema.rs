@@ -206,6 +206,11 @@ pub struct Light {
     pub gain_machined: Option<f64>,
     pub uniformity_designed: Option<f64>,
     pub uniformity_machined: Option<f64>,
+    /// The same over the screen's cells, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub screen_uniformity_designed: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub screen_uniformity_machined: Option<f64>,
     /// Part of the samples that the projector does not reach.
     pub shadowed_designed: Option<f64>,
     pub shadowed_machined: Option<f64>,

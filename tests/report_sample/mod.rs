@@ -93,6 +93,8 @@ pub fn report() -> Report {
         gain_machined: Some(7.84),
         uniformity_designed: Some(0.97),
         uniformity_machined: None,
+        screen_uniformity_designed: None,
+        screen_uniformity_machined: None,
         shadowed_designed: Some(0.0),
         shadowed_machined: Some(0.0),
         standard_error: None,
