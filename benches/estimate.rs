@@ -1,11 +1,13 @@
 //! `cargo bench --bench estimate [-- MILLIONS]`: a program of that many million blocks (10 if left out),
-//! read and timed for each of some machines; blocks a second, and the peak of memory.
+//! read and timed for each of some machines, and a million moves written; blocks a second, and the peak of memory.
 
 use std::hint::black_box;
 use std::io::{BufReader, Read};
 use std::time::Instant;
 
-use screenmill::machine::Machine;
+use screenmill::machine::{Library, Machine};
+use screenmill::post::{self, Dialect, Program, StockFacts, ZZero};
+use screenmill::toolpath::{Kind, Move, Toolpath};
 use screenmill::verify::{self, Clock, Kinematics, Options};
 
 /// The text of a wavy relief in blocks of 0.05 mm, made as it is read, so that no memory holds it.
@@ -56,6 +58,45 @@ fn peak_mb() -> Option<f64> {
     Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
 }
 
+/// Writes a million moves that name three axes each.
+fn write() {
+    let dialect = Dialect::find("linuxcnc", None).expect("embedded");
+    let machine = Machine::find("linuxcnc-mill", None).expect("embedded");
+    let library = Library::find("tools", None).expect("embedded");
+    let mut moves = vec![Move { kind: Kind::Rapid, to: [0, 0, 50_000] }];
+    moves.extend(
+        (0..1_000_000).map(|i| Move { kind: Kind::Cut, to: [i * 3, i / 1000 * 500, -(i * 7 % 9973)] }),
+    );
+    let path = Toolpath { unit_mm: dialect.unit_mm, moves, pass_starts: vec![0], tilt: None };
+    let stock = StockFacts {
+        material: "aluminium".into(),
+        width_mm: 10.0,
+        height_mm: 10.0,
+        thickness_mm: 10.0,
+        top_allowance_mm: 0.2,
+    };
+    let program = Program {
+        path: &path,
+        part: "p",
+        tile: "r0c0",
+        operation: "finish",
+        number: 1,
+        section: None,
+        spindle: true,
+        tool: library.tool("ball-1").expect("in it"),
+        stock: &stock,
+        z_zero: ZZero::StockTop,
+        wcs: "G54",
+        clearance_mm: 5.0,
+        notes: &[],
+    };
+    let mut text = Vec::new();
+    let start = Instant::now();
+    post::write(&program, &dialect, &machine, &mut text).expect("written");
+    let seconds = start.elapsed().as_secs_f64();
+    println!("written: {:.2} million moves a second, {} MB", 1.0 / seconds, text.len() / 1_000_000);
+}
+
 fn main() {
     let millions: f64 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(10.0);
     let blocks = (millions * 1e6) as u64;
@@ -68,6 +109,7 @@ fn main() {
         ("linuxcnc-sim", b"G21 G90 G61\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
         ("grbl-router", b"G21 G90\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
     ];
+    write();
     println!("{millions} million blocks; making the text is taken off ({making:.1} s)");
     for (name, head) in modes {
         let machine = Machine::find(name, None).expect("a machine that comes along");

@@ -5,6 +5,7 @@
 //! drawn from its lobe), and that ray meets the surface again, the audience, or neither. Normals are central
 //! differences at the raster step, for the design and for the cut alike.
 
+mod ground;
 mod metal;
 mod planes;
 mod relief;
