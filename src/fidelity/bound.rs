@@ -224,12 +224,12 @@ mod tests {
 
     #[test]
     fn where_it_says_that_a_cutter_gets_no_lower_it_does_not() {
-        let around = relief(Window { column: -37, row: 11, columns: 300, rows: 240 });
+        let around = relief(Window { column: -37, row: 11, columns: 460, rows: 400 });
         let peaks = Peaks::of(&around);
         let mut spared = 0;
         for (name, other) in [
-            ("flat:1", "ball:0.4"),
-            ("ball:0.8", "flat:0.6"),
+            ("flat:2", "ball:0.4"),
+            ("ball:1.6", "flat:0.6"),
             ("bull:1:0.2", "ball:0.4"),
             ("vee:90:0.1:1", "ball:0.8"),
         ] {

@@ -123,3 +123,67 @@ fn widest<C: Contact>(band: &mut Band, contact: C, judged: &Judged) -> ProgramCu
     }
     band.take::<C, above::Portable>(contact, judged)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::above::{Above, Portable};
+    use super::*;
+    use crate::cutter::Shape;
+    use crate::verify::{Blank, Options, Reading};
+
+    /// Passes along both axes that turn up and down, a descent, and moves at an angle.
+    fn reading() -> Reading {
+        let mut text = String::from("G21 G90 M3\nG0 Z2\nG0 X0 Y0\nF300\nG1 Z-0.2\n");
+        for k in 0..60 {
+            let (a, b) = ((f64::from(k) * 0.618_034).fract(), (f64::from(k) * 0.754_878).fract());
+            let z = -0.6 * (f64::from(k) * 0.569_840).fract();
+            text += &match k % 4 {
+                0 | 1 => format!("G1 X{:.4} Z{z:.4}\n", 1.7 * a),
+                2 => format!("G1 Y{:.4} Z{z:.4}\n", 1.3 * b),
+                _ => format!("G1 X{:.4} Y{:.4} Z{z:.4}\n", 1.7 * b, 1.3 * a),
+            };
+        }
+        Reading::of((text + "G0 Z2\nM2\n").as_bytes(), &Options::default()).expect("a program")
+    }
+
+    fn cut<V: Above>(reading: &Reading, shape: Shape) -> (Vec<u32>, ProgramCut) {
+        let window = Window { column: -13, row: -9, columns: 101, rows: 64 };
+        let blank = Blank { low_mm: [-0.15; 2], high_mm: [1.5; 2], top_mm: 0.1 };
+        let step_mm = 0.02;
+        let mut heights = blank.heights(window, step_mm, 0.0);
+        let places = |first: i64, count: usize| -> Vec<f64> {
+            (0..count + LINES).map(|k| ((first + k as i64) as f64 + 0.5) * step_mm).collect()
+        };
+        let x_mm = places(window.column, window.columns);
+        let mut band = Band {
+            z_mm: &mut heights.z_mm,
+            x_mm: &x_mm,
+            y_mm: places(window.row, window.rows),
+            per_mm: 1.0 / step_mm,
+            window,
+            datum_mm: 0.0,
+        };
+        let judged = Judged::new(reading, shape, [0.0; 3]);
+        let cut = with_contact!(&shape, contact => band.take::<_, V>(contact, &judged));
+        (heights.z_mm.iter().map(|z| z.to_bits()).collect(), cut)
+    }
+
+    #[test]
+    fn every_instruction_set_cuts_the_same() {
+        let reading = reading();
+        for name in ["ball:0.6", "flat:0.5", "bull:0.6:0.1", "vee:60:0.1:0.7", "taper:0.2:10:0.6"] {
+            let shape = name.parse().expect("a cutter");
+            let plain = cut::<Portable>(&reading, shape);
+            assert!(plain.1.deepest_bite_mm() > 0.3, "{name}: {:?}", plain.1);
+            #[cfg(target_arch = "x86_64")]
+            {
+                if is_x86_feature_detected!("avx2") {
+                    assert!(cut::<above::Avx2>(&reading, shape) == plain, "{name} with AVX2");
+                }
+                if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
+                    assert!(cut::<above::Avx512>(&reading, shape) == plain, "{name} with AVX-512");
+                }
+            }
+        }
+    }
+}
