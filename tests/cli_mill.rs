@@ -264,6 +264,35 @@ fn one_wrong_z_word_changes_deviation_gouge_and_light() {
     assert!(wrong[2] < sound[2] - 1e-3, "light: {sound:?}, then {wrong:?}");
 }
 
+/// What `check` says a cutter costs in light is what `light` finds on its closing.
+#[test]
+fn check_says_of_a_cutter_what_light_says_of_its_closing() {
+    let bench = Bench::with(&[]);
+    let said = bench.run("check job.toml --json --quiet");
+    let checked: Value = serde_json::from_slice(&said.get_output().stdout).expect("JSON");
+    bench.run("design screen.toml --out d.npz --cells 324 149 325 150 --quiet").success();
+    let cutters = checked["cutters"].as_array().expect("cutters");
+    let mut before = 1.0;
+    for shape in ["ball:0.5", "ball:1", "ball:2"] {
+        let cutter = cutters.iter().find(|c| c["cutters"][0] == shape).expect("in the library");
+        bench
+            .run(&format!(
+                "compensate d.npz --cutter {shape} --closing c.tif --sampled --step-mm 0.02 --quiet"
+            ))
+            .success();
+        bench.run("light d.npz --surface c.tif --screen screen.toml --out lit --quiet").success();
+        let lit = bench.json("lit/report.json");
+        for key in ["on_audience_designed", "on_audience_machined", "leak_machined"] {
+            let [a, b] = [&cutter["light"][key], &lit["light"][key]].map(|v| v.as_f64().expect("a share"));
+            // The file holds z itself, `check` what is below the top: normals differ by the floats.
+            assert!((a - b).abs() < 1e-3, "{shape} {key}: {a} by check, {b} by light");
+        }
+        let now = cutter["light"]["on_audience_machined"].as_f64().expect("a share");
+        assert!(now < before, "a larger ball returns less: {shape} {now}, {before}");
+        before = now;
+    }
+}
+
 /// Polishing by hand takes off ridges, here those that a stepover of 0.1 mm leaves: more light comes than from the cut, never
 /// more than from the design. What the model says stands beside the cut, which it leaves as it was.
 #[test]

@@ -285,9 +285,13 @@ impl Facts<'_> {
         let mut reached = vec![0u16; near.samples()];
         let mut measured = Vec::new();
         for (bit, set) in sets.iter().enumerate() {
-            let closing = self.closing(&around, set, near);
-            for ((mask, closed), z) in reached.iter_mut().zip(&closing.z_mm).zip(&design.z_mm) {
-                *mask |= u16::from(closed - z <= limit_mm) << bit;
+            let mut closing = self.closing(&around, set, near);
+            for ((mask, closed), z) in reached.iter_mut().zip(&mut closing.z_mm).zip(&design.z_mm) {
+                *mask |= u16::from(*closed - z <= limit_mm) << bit;
+                if z.is_nan() {
+                    // Past the part's edge there is nothing, only the cutter's flank.
+                    *closed = f32::NAN;
+                }
             }
             let mut tally = Tally::new(self.params());
             let cavity = compensation::residual(&closing, &design);
