@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use screenmill::catalogue::{self, Kind};
 use screenmill::machine::{
     Blanks, Bounds, Error, Fixture, Guard, Library, Machine, Quantum, Setup, Stock, ZNeed, fits_z, floor_mm,
-    split, split_in_z,
+    split, split_to_fit,
 };
 
 fn stock(blanks: Blanks) -> Stock {
@@ -153,16 +153,17 @@ fn what_is_too_deep_in_one_piece_is_cut_in_smaller_ones() {
     // A slope of 0.2 in X: a tile is as deep as a fifth of its width.
     let need = |width_mm: f64| ZNeed { depth_mm: 0.2 * width_mm, top_allowance_mm: 0.2, clearance_mm: 5.0 };
     let cell = Quantum::Cell { cell_mm: 4.0 };
-    let tiles = split_in_z([400.0, 8.0], cell, 0.5, 20.0, &stock, &machine, &fixture, |tile| {
-        Ok::<_, Error>(need(tile.width_mm))
+    let tiles = split_to_fit([400.0, 8.0], cell, 0.5, 20.0, &stock, &machine, &fixture, |tile| {
+        Ok::<_, Error>(fits_z(&tile.name, need(tile.width_mm), &machine).err())
     })
     .expect("narrower tiles are less deep");
     assert_eq!(tiles.len(), 4);
     assert!(tiles.iter().all(|tile| fits_z(&tile.name, need(tile.width_mm), &machine).is_ok()));
     let deep = ZNeed { depth_mm: 51.9, top_allowance_mm: 0.2, clearance_mm: 5.0 };
-    let refusal =
-        split_in_z([400.0, 8.0], cell, 0.5, 20.0, &stock, &machine, &fixture, |_| Ok::<_, Error>(deep))
-            .expect_err("no tile is less deep");
+    let refusal = split_to_fit([400.0, 8.0], cell, 0.5, 20.0, &stock, &machine, &fixture, |tile| {
+        Ok::<_, Error>(fits_z(&tile.name, deep, &machine).err())
+    })
+    .expect_err("no tile is less deep");
     assert_eq!(
         refusal.to_string(),
         "tile r0c0 needs 57.1 mm of Z travel, roland-egx-600 has 42.5 mm; hint: level = \"plane\" or smaller tiles"

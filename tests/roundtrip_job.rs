@@ -183,7 +183,9 @@ fn with_all_beside(more: &[(&str, &str)]) -> Bench {
 #[test]
 fn holes_marks_outline_and_slot_are_where_the_job_wants_them() {
     let bench = with_all_beside(&[]);
-    let report = bench.mill(0);
+    let output = bench.run("mill job.toml --out out --quiet").code(0).get_output().stdout.clone();
+    let report = bench.json("out/report.json");
+    bench.run(&printed(&output)).success();
     let files = programs(&report);
     let names: Vec<&str> = files.iter().map(|file| file.trim_start_matches("programs/r0c0-")).collect();
     assert_eq!(

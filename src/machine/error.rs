@@ -26,6 +26,10 @@ pub enum Error {
     )]
     Reach { tool: String, stick_out_mm: f64, depth_mm: f64 },
     #[error(
+        "tool \"{tool}\" has a neck of {neck_length_mm} mm and has to go {depth_mm:.3} mm deep where it is {width_mm} mm wide, its shank is {shank_diameter_mm} mm; hint: a tool with a longer neck, or a thinner blank"
+    )]
+    Neck { tool: String, neck_length_mm: f64, shank_diameter_mm: f64, width_mm: f64, depth_mm: f64 },
+    #[error(
         "tool \"{tool}\" runs at {rpm} rpm, {machine} turns {low} .. {high} rpm; hint: spindle_rpm in that range, or a library made for this machine"
     )]
     Rpm { tool: String, rpm: f64, machine: String, low: f64, high: f64 },
@@ -47,6 +51,10 @@ pub enum Error {
         margin_mm: f64,
         overrun_mm: f64,
     },
+    #[error(
+        "the blank of tile {tile} is {length_mm:.3} mm along {axis} as it lies, {fixture} on {machine} takes {room_mm:.3} mm; hint: a smaller margin_mm, another fixture or a larger machine"
+    )]
+    Blank { tile: String, length_mm: f64, axis: &'static str, room_mm: f64, machine: String, fixture: String },
     #[error(
         "tile {tile} needs {needed_mm:.1} mm of Z travel, {machine} has {travel_mm} mm; hint: level = \"plane\" or smaller tiles"
     )]

@@ -15,5 +15,5 @@ pub use fixture::{Border, Clamp, Fixture, KeepOut, Side};
 pub use profile::{Coolant, Corner, Machine, Motion, PerAxis, Rate, Spindle, SpindleLaw, Transfer, Travel};
 pub use setup::{Bounds, Obstacle, Setup};
 pub use spindle::SpindleSetting;
-pub use split::{Blanks, Quantum, Stock, Tile, ZNeed, fits_z, floor_mm, split, split_in_z};
+pub use split::{Blanks, Quantum, Stock, Tile, ZNeed, fits_z, floor_mm, split, split_to_fit};
 pub use tool::{Body, Cylinder, Library, Tool};

@@ -96,6 +96,28 @@ impl Setup {
         tops.fold(retract_mm, f64::max)
     }
 
+    /// Refuses a blank that is larger than what machine and fixture take.
+    pub fn check_blank(&self, machine: &Machine, fixture: &Fixture) -> Result<(), Error> {
+        let travel = [machine.travel.x_mm, machine.travel.y_mm];
+        let border = [fixture.border_mm.x, fixture.border_mm.y];
+        for axis in 0..2 {
+            let length_mm = self.blank.high_mm[axis] - self.blank.low_mm[axis];
+            let most = fixture.blank_max_mm.map_or(f64::INFINITY, |most| [most.x, most.y][axis]);
+            let room_mm = (travel[axis] - 2.0 * border[axis]).min(most);
+            if length_mm > room_mm + 1e-9 {
+                return Err(Error::Blank {
+                    tile: self.tile.name.clone(),
+                    length_mm,
+                    axis: ["X", "Y"][axis],
+                    room_mm,
+                    machine: machine.name.clone(),
+                    fixture: fixture.name.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Refuses a tile that a cutter cannot get to for clamps: boxes that stand in the tile, or nearer to it than
     /// `reach_mm`, how far past the tile's edges the operations cut, the cutter's radius included; with what of a tool is
     /// wider than its cutter they go up to `widest_mm`, for which the hint asks.

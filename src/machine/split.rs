@@ -78,12 +78,12 @@ pub fn split(
     Ok(grid(size_mm, quantum, counts))
 }
 
-/// As [`split`], and divided further until `need` (the Z that a tile asks for) fits the machine.
-/// Pieces do not get shorter than `smallest_mm`.
+/// As [`split`], and divided further until `refusal` finds nothing against any tile: its Z, or the blank that it needs
+/// once it is turned level. Pieces do not get shorter than `smallest_mm`.
 ///
-/// Errors: those of `need`, and that of [`fits_z`] for the first tile of the undivided part.
-#[expect(clippy::too_many_arguments, reason = "those of split, and what asks for Z")]
-pub fn split_in_z<E: From<Error>>(
+/// Errors: those of `refusal` itself, and what it finds against the first tile of the undivided part.
+#[expect(clippy::too_many_arguments, reason = "those of split, and what a tile must keep")]
+pub fn split_to_fit<E: From<Error>>(
     size_mm: [f64; 2],
     quantum: Quantum,
     overrun_mm: f64,
@@ -91,21 +91,21 @@ pub fn split_in_z<E: From<Error>>(
     stock: &Stock,
     machine: &Machine,
     fixture: &Fixture,
-    mut need: impl FnMut(&Tile) -> Result<ZNeed, E>,
+    mut refusal: impl FnMut(&Tile) -> Result<Option<Error>, E>,
 ) -> Result<Vec<Tile>, E> {
     let mut counts = counts(size_mm, quantum, overrun_mm, stock, machine, fixture)?;
     let mut first_refusal: Option<Error> = None;
     loop {
         let tiles = grid(size_mm, quantum, counts);
-        let mut refusal = None;
+        let mut found = None;
         for tile in &tiles {
-            refusal = fits_z(&tile.name, need(tile)?, machine).err();
-            if refusal.is_some() {
+            found = refusal(tile)?;
+            if found.is_some() {
                 break;
             }
         }
-        let Some(refusal) = refusal else { return Ok(tiles) };
-        let refusal = first_refusal.take().unwrap_or(refusal);
+        let Some(found) = found else { return Ok(tiles) };
+        let refusal = first_refusal.take().unwrap_or(found);
         let length = |axis: usize| size_mm[axis] / counts[axis] as f64;
         let axis = if length(0) >= length(1) { 0 } else { 1 };
         let shortest = smallest_mm.max(quantum.length_mm());

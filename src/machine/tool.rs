@@ -108,6 +108,24 @@ impl Tool {
     }
 }
 
+impl Tool {
+    /// Refuses a tool whose shank would not follow it into a slot or hole of this width.
+    pub fn check_neck(&self, width_mm: f64, depth_mm: f64) -> Result<(), Error> {
+        match self.body {
+            Some(body) if depth_mm > body.neck_length_mm && body.shank_diameter_mm > width_mm => {
+                Err(Error::Neck {
+                    tool: self.name.clone(),
+                    neck_length_mm: body.neck_length_mm,
+                    shank_diameter_mm: body.shank_diameter_mm,
+                    width_mm,
+                    depth_mm,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 const FEED: [f64; 2] = [0.1, 100_000.0];
 const RPM: [f64; 2] = [1.0, 1_000_000.0];
 

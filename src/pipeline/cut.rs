@@ -32,7 +32,7 @@ const CANDIDATES: usize = 4;
 /// A judged job.
 pub struct Milled {
     pub report: Report,
-    /// For each tile, the command that repeats its judgement from its files.
+    /// The command that repeats the judgement of a tile from its files, for each whose surface is cut.
     pub simulate: Vec<String>,
 }
 
@@ -100,7 +100,17 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
         let setup = Setup { tile: tile.clone(), ..setup };
         Ok(TileSetup::new(job, shop, setup, piece, part_top_mm))
     };
-    let tiles = machine::split_in_z(
+    let blanks_differ = job.stock.blanks == Blanks::PerTile;
+    let refusal = |tile: &machine::Tile| -> Result<Option<machine::Error>, Error> {
+        let tile_setup = put(tile)?;
+        let fits = machine::fits_z(&tile.name, tile_setup.need(), &shop.machine);
+        let lies = match blanks_differ {
+            true => tile_setup.setup.check_blank(&shop.machine, &shop.fixture),
+            false => Ok(()),
+        };
+        Ok(fits.and(lies).err())
+    };
+    let tiles = machine::split_to_fit(
         size_mm,
         part.quantum(),
         overrun_mm,
@@ -108,7 +118,7 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
         &shop.stock,
         &shop.machine,
         &shop.fixture,
-        |tile| Ok::<_, Error>(put(tile)?.need()),
+        refusal,
     )?;
     let mut setups = Vec::new();
     for tile in &tiles {
@@ -127,6 +137,10 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
                 _ => operation.depth_mm.unwrap_or(0.0),
             };
             tool.check_reach(cut_mm)?;
+            if operation.kind == Kind::CutOut || operation.kind == Kind::Drill {
+                let own_mm = 2.0 * tool.shape.radius_mm();
+                tool.check_neck(operation.diameter_mm.unwrap_or(own_mm), cut_mm)?;
+            }
             let stroke = machine::ZNeed { depth_mm: cut_mm, top_allowance_mm: 0.0, ..need };
             machine::fits_z(&setup.setup.tile.name, stroke, &shop.machine)?;
         }

@@ -8,6 +8,9 @@ use crate::machine::Guard;
 use crate::report::{Finding, Severity, finding};
 use crate::verify::{Judged, Language, Note, ProgramCut};
 
+/// A bite that is deeper than allowed by less is float noise.
+const BITE_MM: f64 = 1e-6;
+
 /// A finding on a program before it is known where its file goes.
 pub struct Remark {
     /// Of the program's text.
@@ -138,7 +141,7 @@ pub fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> 
     let mut found = Vec::new();
     let bite_mm = cut.deepest_bite_mm();
     if let Some(most_mm) = tool.max_depth_mm
-        && bite_mm > most_mm
+        && bite_mm > most_mm + BITE_MM
     {
         let message = format!(
             "{} bites {bite_mm:.3} mm deep at once, its max_depth_mm is {most_mm}; hint: a smaller stepdown, or a semi-finish before it",

@@ -9,7 +9,7 @@ use super::shop::Shop;
 use super::{Error, WITHIN, light, pages};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
-use crate::job::{Face, Form, Job};
+use crate::job::{Form, Job};
 use crate::report::cavity_list::{self, TileCavities};
 use crate::report::picture::{Caption, write_png};
 use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
@@ -72,7 +72,7 @@ pub fn finish(
     cavity_list::write_csv(&staging.join("cavities.csv"), &cavities)?;
     cavity_list::write_geojson(&staging.join("cavities.geojson"), &cavities)?;
     report::write_json(&staging.join("report.json"), &report)?;
-    let simulate: Vec<String> = results.iter().map(|result| simulate(shop, result)).collect();
+    let simulate: Vec<String> = results.iter().filter_map(|result| simulate(shop, result)).collect();
     pages::write(job, shop, part, &report, &results, &simulate, staging)?;
     Ok(Milled { report, simulate })
 }
@@ -321,12 +321,15 @@ fn of_limits(job: &Job, report: &Report, figures: &Figures) -> Vec<Finding> {
     found
 }
 
-/// The command that judges a tile's programs again from the files alone.
-fn simulate(shop: &Shop, result: &TileResult) -> String {
+/// The command that judges a tile's surface again from the files of the programs that make it; None where none does.
+fn simulate(shop: &Shop, result: &TileResult) -> Option<String> {
     let post = &result.posts[0];
-    let top = post.programs.iter().filter(|program| program.face == Face::Top);
-    let files: Vec<String> = top.clone().map(|p| format!("{{out}}/{}", p.file.display())).collect();
-    let cutters: Vec<String> = top.map(|p| shop.tools[p.operation].shape.to_string()).collect();
+    let shaping = post.programs.iter().filter(|program| shop.kinds[program.operation].shapes());
+    let files: Vec<String> = shaping.clone().map(|p| format!("{{out}}/{}", p.file.display())).collect();
+    let cutters: Vec<String> = shaping.map(|p| shop.tools[p.operation].shape.to_string()).collect();
+    if files.is_empty() {
+        return None;
+    }
     let top_mm = result.tile.piece.origin_mm.z;
     let tile = &result.tile;
     let name = &tile.setup.tile.name;
@@ -338,9 +341,9 @@ fn simulate(shop: &Shop, result: &TileResult) -> String {
         top_mm + tile.allowance_mm,
         shop.machine.name
     );
-    if result.map_factor == 1 {
+    Some(if result.map_factor == 1 {
         command
     } else {
         format!("{command}  (the maps are reduced by {}; set [maps] full = true first)", result.map_factor)
-    }
+    })
 }
