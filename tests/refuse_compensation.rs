@@ -67,7 +67,7 @@ fn more_memory_than_there_is_is_refused_with_the_figure() {
     let part = scratch.path().join("part.npy");
     write_part(&part, "0 0 0");
     let bytes = fs::read(&part).expect("a file");
-    let columns = 100_000_000u64;
+    let columns = 16_000_000u64;
     let header = bytes.len() - 12;
     let start = bytes[..header].windows(6).position(|w| w == b"'shape").expect("a shape");
     let shape = format!("'shape': (1, {columns}), }}");
@@ -83,13 +83,13 @@ fn more_memory_than_there_is_is_refused_with_the_figure() {
         .expect("the program")
         .arg("compensate")
         .arg(&part)
-        .args(["--cutter", "ball:3", "--pixel-mm", "0.01", "--quiet", "--closing"])
+        .args(["--cutter", "ball:30", "--pixel-mm", "0.01", "--quiet", "--closing"])
         .arg(&closing)
         .output()
         .expect("a run");
     let said = String::from_utf8_lossy(&done.stderr);
     assert_eq!(done.status.code(), Some(2), "{said}");
-    assert!(said.starts_with("error: 100000000 columns under cutter ball:3 take 4"), "{said}");
+    assert!(said.starts_with("error: 16000000 columns under cutter ball:30 take 7"), "{said}");
     assert!(said.contains("GB are free; hint: "), "{said}");
     assert!(!closing.exists());
 }

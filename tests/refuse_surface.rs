@@ -134,6 +134,7 @@ fn cases() -> Vec<(&'static str, &'static str, Vec<u8>, &'static str)> {
         ("npy-fortran", "fortran.npy", npy_of("(2, 2)", "<f4", "True", &[0; 16]), "--pixel-mm 0.1"),
         ("npy-cut", "cut.npy", f4("(2, 3)"), "--pixel-mm 0.1"),
         ("npy-claims-much", "claim.npy", f4("(4000000000, 4000000000)"), "--pixel-mm 0.1"),
+        ("npy-wide", "wide.npy", f4("(2, 20000000)"), "--pixel-mm 0.1"),
         ("npy-no-pitch", "pitch.npy", f4("(2, 2)"), ""),
         ("npy-nothing", "nothing.npy", f4("(0, 2)"), "--pixel-mm 0.1"),
         ("png-garbage", "garbage.png", b"no picture at all".to_vec(), "--pixel-mm 0.1"),

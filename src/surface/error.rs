@@ -31,6 +31,10 @@ pub enum Error {
         "{path}: {columns} x {rows} samples of {bytes} bytes each, at most {limit:.0e} samples can be held; hint: is the file damaged?"
     )]
     HugeClaim { path: String, columns: u64, rows: u64, bytes: u64, limit: f64 },
+    #[error(
+        "{path}: {columns} columns ({rows} rows), at most {most} can be held side by side; hint: cut it into pieces, or turn it by 90 degrees"
+    )]
+    Wide { path: String, columns: u64, rows: u64, most: u64 },
     #[error("{path}: {columns} x {rows} samples are no image; hint: is the file damaged?")]
     NoSamples { path: String, columns: u64, rows: u64 },
     #[error("{path}: the file is empty (0 bytes); hint: export or copy it again")]

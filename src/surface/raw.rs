@@ -6,6 +6,9 @@ use std::sync::Mutex;
 
 use super::{Error, MOST_SAMPLES};
 
+/// Columns at most: some rows are held whole by every stage. 168 m at 10 um.
+const MOST_COLUMNS: u64 = 1 << 24;
+
 /// How one sample is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stored {
@@ -124,6 +127,9 @@ pub(super) fn claim(path: &str, columns: u64, rows: u64, bytes: u64) -> Result<(
     let side = u64::from(u32::MAX);
     if columns > side || rows > side || columns as f64 * rows as f64 > MOST_SAMPLES {
         return Err(Error::HugeClaim { path: path.into(), columns, rows, bytes, limit: MOST_SAMPLES });
+    }
+    if columns > MOST_COLUMNS {
+        return Err(Error::Wide { path: path.into(), columns, rows, most: MOST_COLUMNS });
     }
     Ok(())
 }
