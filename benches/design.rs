@@ -1,5 +1,9 @@
 //! `cargo bench --bench design [-- CELLS]`: cells of the three sample scenes on one thread, what
 //! sampling and solving take, and the plain solver of the tests on the same cells in the same run.
+//! `cargo bench --bench design -- figures DIR`: the figures of the design that stand in docs/.
+
+#[path = "figures/design.rs"]
+mod figures;
 
 #[allow(dead_code)]
 #[path = "../tests/screen/plain.rs"]
@@ -11,6 +15,11 @@ use std::time::Instant;
 use screenmill::screen::{self, Scene, Workspace, directions, facets, solve};
 
 fn main() {
+    let words: Vec<String> = std::env::args().collect();
+    if let Some(at) = words.iter().position(|word| word == "figures") {
+        figures::write(words.get(at + 1).map_or("docs", String::as_str).as_ref());
+        return;
+    }
     let cells: usize = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(200);
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("the first pool of the program");
     println!("one thread; milliseconds a cell");

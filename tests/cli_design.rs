@@ -53,7 +53,10 @@ fn stitched_cells_become_one_solid_that_can_be_read_again() {
     let scene = coarse(folder.path(), "\"step\" ", "\"stitched\" ");
     let [npz, stl, tif] = ["a.npz", "a.stl", "a.tif"].map(|name| folder.path().join(name));
     let [npz, stl, tif] = [&npz, &stl, &tif].map(|path| path.to_str().expect("text"));
-    design(&[&scene, "--out", npz, "--stl", stl, "--cells", "3", "2", "5", "4"]).success();
+    design(&[&scene, "--out", npz, "--stl", stl, "--cells", "3", "2", "5", "4"]).success().stdout(
+        predicate::str::is_match("no steps between cells; .* off by [0-9.]+ % rms, [0-9]+ % at most")
+            .expect("a pattern"),
+    );
     screenmill(&["raster", stl, "--out", tif, "--step-mm", "5"]).success();
 }
 

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
+use screenmill::screen::{Cell, CellRange, Design, Facet, Profile, Seam};
 
 /// A binary STL of these triangles that announces `count` of them.
 fn binary_stl(count: u32, triangles: &[[f32; 9]]) -> Vec<u8> {
@@ -76,6 +77,22 @@ fn float_tiff(columns: u32, rows: u32, data: &[f32]) -> Vec<u8> {
     tiff(&fields, &bytes)
 }
 
+/// One flat cell of 15 um.
+fn fine_design() -> Vec<u8> {
+    let facet = Facet { gradient: [0.0; 2], offset_mm: 0.0, area_mm2: 0.015 * 0.015 };
+    let design = Design {
+        core: CellRange { c0: 0, r0: 0, c1: 1, r1: 1 },
+        cell_mm: 0.015,
+        profile: Profile::Bump,
+        seam: Seam::Step,
+        cells: vec![Cell { column: 0, row: 0, elevation_mm: 0.0, facets: vec![facet] }],
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fine.npz");
+    design.write(&path).unwrap();
+    fs::read(path).unwrap()
+}
+
 /// Case, file name, its bytes, further arguments.
 fn cases() -> Vec<(&'static str, &'static str, Vec<u8>, &'static str)> {
     use ::png::{BitDepth, ColorType};
@@ -144,6 +161,7 @@ fn cases() -> Vec<(&'static str, &'static str, Vec<u8>, &'static str)> {
         ("png-bad-range", "bad.png", grey(), "--pixel-mm 0.1 --z-min-mm 1 --z-max-mm 1"),
         ("png-no-pitch", "pitch.png", grey(), "--z-min-mm 0 --z-max-mm 1"),
         ("npz-garbage", "garbage.npz", b"no archive".to_vec(), ""),
+        ("npz-cells-below-the-step", "fine.npz", fine_design(), ""),
     ]
 }
 

@@ -191,6 +191,48 @@ fn solids_are_closed_and_hold_the_volume_under_the_surface() {
     }
 }
 
+#[test]
+fn areas_of_stitched_facets_are_those_of_the_surface() {
+    let mut scene = theatre();
+    scene.elevation = screen::ElevationMethod::Poisson;
+    scene.microgeometry.facets = 12;
+    let heights = screen::elevation(&scene).expect("an elevation");
+    for profile in [Profile::Bump, Profile::Dish] {
+        let core = CellRange { c0: 497, r0: 247, c1: 500, r1: 250 };
+        (scene.microgeometry.profile, scene.microgeometry.seam) = (profile, Seam::Step);
+        let steps = screen::design(&scene, Some(core), Some(&heights), &|_, _| ()).expect("a design");
+        let worst = steps.area_errors().into_iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
+        assert!(worst < 2e-6, "with steps areas are those asked for, not {worst} off");
+        scene.microgeometry.seam = Seam::Stitched;
+        let design = screen::design(&scene, Some(core), Some(&heights), &|_, _| ()).expect("a design");
+        let errors = design.area_errors();
+        let core_cells: Vec<_> = design.core_cells().collect();
+        assert_eq!(errors.len(), core_cells.iter().map(|cell| cell.facets.len()).sum::<usize>());
+        // The middle cell by counting 20 um samples of the surface: whose plane is at its height?
+        let first: usize = core_cells[..4].iter().map(|cell| cell.facets.len()).sum();
+        let cell = core_cells[4];
+        let centre = design.centre_mm(cell);
+        let mut counted = vec![0.0; cell.facets.len()];
+        let step = 0.02;
+        for (i, j) in (0..400).flat_map(|i| (0..400).map(move |j| (i, j))) {
+            let p = [2.0 + (f64::from(i) + 0.5) * step, 2.0 + (f64::from(j) + 0.5) * step];
+            let z = surface(&design, p);
+            let own = [p[0] - centre[0], p[1] - centre[1]];
+            let on = |facet: &screen::Facet| (cell.elevation_mm + facet.height_mm(own) - z).abs() < 1e-12;
+            if let Some(k) = cell.facets.iter().position(on) {
+                counted[k] += step * step;
+            }
+        }
+        let mut moved = 0.0f64;
+        for ((facet, error), counted) in cell.facets.iter().zip(&errors[first..]).zip(counted) {
+            let area = facet.area_mm2 * (1.0 + error);
+            assert!((area - counted).abs() < 0.02, "{profile:?}: {area} mm2, counted {counted}");
+            moved = moved.max(error.abs());
+        }
+        assert!(moved > 0.02, "seams move borders, here by {moved}");
+    }
+}
+
 /// The surface by the container's definition.
 fn surface(design: &Design, p: [f64; 2]) -> f64 {
     let core = design.core;

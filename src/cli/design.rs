@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use screenmill::progress::Progress;
 use screenmill::screen::{
-    self, CellRange, DesignWriter, Elevation, Frame, Profile, Scene, Seam, SolidWriter,
+    self, AreaError, CellRange, DesignWriter, Elevation, Frame, Profile, Scene, Seam, SolidWriter, Stitching,
 };
 use serde_json::json;
 
@@ -62,13 +62,18 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let watch = Watch::new(common.quiet, frame.extent.columns() * frame.extent.rows());
     let mut writer = DesignWriter::create(&arguments.out, &frame)?;
     let mut solids = arguments.stl.as_ref().map(|stl| SolidWriter::create(stl, &frame)).transpose()?;
+    let mut stitching = (frame.seam == Seam::Stitched).then(|| Stitching::new(&frame));
     screen::design_streamed::<Refusal>(&scene, &frame, elevation.as_ref(), &watch, &mut |cell| {
         made.count(&cell);
+        if let Some(stitching) = &mut stitching {
+            stitching.push(&cell);
+        }
         if let Some(solids) = &mut solids {
             solids.push(&cell)?;
         }
         Ok(writer.push(&cell)?)
     })?;
+    made.area_error = stitching.map(Stitching::finish);
     watch.begin("writing", 0);
     if let Some(solids) = solids {
         solids.finish()?;
@@ -92,6 +97,8 @@ struct Made {
     facets: usize,
     facets_per_cell: [usize; 2],
     elevation_mm: [f64; 2],
+    /// What stitching leaves of the facets' areas.
+    area_error: Option<AreaError>,
 }
 
 impl Made {
@@ -103,6 +110,7 @@ impl Made {
             facets: 0,
             facets_per_cell: [usize::MAX, 0],
             elevation_mm: [f64::INFINITY, f64::NEG_INFINITY],
+            area_error: None,
         }
     }
 
@@ -225,6 +233,7 @@ fn summarise(scene: &Scene, made: &Made, arguments: &Arguments, json: bool) {
             "width_mm": width_mm, "height_mm": height_mm, "profile": profile, "seam": seam,
             "facets": facets, "facets_per_cell": [fewest, most],
             "elevation_mm": [low, high], "bare_mm": bare,
+            "stitched_area_error": made.area_error.map(|error| json!({"rms": error.rms, "worst": error.worst})),
         });
         println!("{summary}");
         return;
@@ -236,6 +245,13 @@ fn summarise(scene: &Scene, made: &Made, arguments: &Arguments, json: bool) {
     let per_cell = if fewest == most { format!("{most}") } else { format!("{fewest} to {most}") };
     println!("{per_cell} facets a cell, {facets} in all; profile {profile}, seam {seam}");
     println!("elevation {low:.3} to {high:.3} mm");
+    if let Some(AreaError { rms, worst }) = made.area_error {
+        println!(
+            "no steps between cells; where their planes meet facet areas are off by {:.1} % rms, {:.0} % at most",
+            1e2 * rms,
+            1e2 * worst
+        );
+    }
     if bare != [0.0, 0.0] {
         println!(
             "a strip of {:.3} mm at the right and {:.3} mm at the top of the screen holds no whole cell",

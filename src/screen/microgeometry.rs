@@ -30,6 +30,8 @@ pub struct Solution {
     /// For each facet given, the one it was merged into; None if it was dropped for its area.
     pub merged_into: Vec<Option<usize>>,
     pub iterations: usize,
+    /// Largest relative area error at the start and after each iteration.
+    pub history: Vec<f64>,
 }
 
 /// The areas were not reached: the largest relative error and the steps made.
@@ -86,6 +88,7 @@ pub fn solve(
     let least = |list: &[f64]| list.iter().copied().fold(f64::INFINITY, f64::min);
     let floor = 0.5 * least(p).min(least(&a));
     let (mut error, mut iterations) = (worst(&a, p), 0);
+    cell.history.push(error);
     let mut r = Vec::with_capacity(n);
     while error > tolerance {
         if iterations == ITERATIONS {
@@ -119,6 +122,7 @@ pub fn solve(
         }
         iterations += 1;
         error = worst(&a, p);
+        cell.history.push(error);
     }
     let mut volume = 0.0;
     for i in 0..n {
@@ -166,6 +170,7 @@ fn merge(gradients: &[[f64; 2]], weights: &[f64], area_mm2: f64) -> Solution {
         achieved_mm2: Vec::new(),
         merged_into: Vec::with_capacity(gradients.len()),
         iterations: 0,
+        history: Vec::new(),
     };
     for (g, &p) in gradients.iter().zip(weights) {
         if p <= negligible {

@@ -18,10 +18,12 @@ mod microgeometry;
 mod opening;
 mod pieces;
 mod power;
+mod rows;
 mod scene;
 mod sight;
 mod silhouette;
 mod solid;
+mod stitching;
 mod top;
 
 pub use audience::{HalfSpace, Polyhedron, View};
@@ -39,3 +41,4 @@ pub use opening::Opening;
 pub use scene::{AreaRule, ElevationMethod, Microgeometry, Reflector, Scene};
 pub use silhouette::Silhouette;
 pub use solid::{SolidError, SolidWriter};
+pub use stitching::{AreaError, Stitching};

@@ -92,10 +92,10 @@ pub(super) fn pieces(diagram: &mut Diagram, cells: &[Planes], half: f64) -> Vec<
         .enumerate()
         .filter_map(|(index, planes)| {
             if index == 0 {
-                return Some((index, Function::new(diagram, planes, half)));
+                return Some((index, Function::new(diagram, planes, [-half; 2], [half; 2])));
             }
             let (near, ceiling) = planes.near(half);
-            (ceiling > floor).then(|| (index, Function::new(diagram, &near, half)))
+            (ceiling > floor).then(|| (index, Function::new(diagram, &near, [-half; 2], [half; 2])))
         })
         .collect();
     let mut found = Vec::new();
@@ -123,6 +123,37 @@ pub(super) fn pieces(diagram: &mut Diagram, cells: &[Planes], half: f64) -> Vec<
     found
 }
 
+/// Of each plane of the first cell the area in mm2 over which it is the surface, within a rectangle
+/// that may reach into the squares of the other cells.
+pub(super) fn owned_areas(
+    diagram: &mut Diagram,
+    cells: &[Planes],
+    low: [f64; 2],
+    high: [f64; 2],
+) -> Vec<f64> {
+    let Some((own, rivals)) = cells.split_first() else { return Vec::new() };
+    let own = Function::new(diagram, own, low, high);
+    let rivals: Vec<Function> = rivals.iter().map(Function::unseen).collect();
+    let mut scratch = Scratch::default();
+    let mut areas = vec![0.0; own.planes.len()];
+    for &plane in &own.seen {
+        let mut parts = vec![own.polygons[plane].clone()];
+        for rival in &rivals {
+            let mut kept = Vec::new();
+            for part in parts {
+                if rival.is_below(&part, &own, plane) {
+                    kept.push(part);
+                } else {
+                    scratch.subtract(&part, &own, plane, rival, false, &mut kept);
+                }
+            }
+            parts = kept;
+        }
+        areas[plane] = parts.iter().map(|part| area(part)).sum();
+    }
+    areas
+}
+
 /// One cell's planes and what each has of the square while no other cell is looked at.
 struct Function {
     planes: Planes,
@@ -132,12 +163,33 @@ struct Function {
 }
 
 impl Function {
-    fn new(diagram: &mut Diagram, planes: &Planes, half: f64) -> Function {
+    fn new(diagram: &mut Diagram, planes: &Planes, low: [f64; 2], high: [f64; 2]) -> Function {
         diagram.forget();
-        diagram.compute(&planes.gx, &planes.gy, &planes.c, [-half; 2], [half; 2]);
+        diagram.compute(&planes.gx, &planes.gy, &planes.c, low, high);
         let polygons: Vec<Vec<Vertex>> = (0..planes.len()).map(|k| diagram.polygon(k).to_vec()).collect();
         let seen = (0..planes.len()).filter(|&k| polygons[k].len() > 2).collect();
         Function { planes: planes.clone(), polygons, seen }
+    }
+
+    /// Of planes that only stand against others: any may be the lowest somewhere.
+    fn unseen(planes: &Planes) -> Function {
+        Function { planes: planes.clone(), polygons: Vec::new(), seen: (0..planes.len()).collect() }
+    }
+
+    /// Whether the plane that is the lowest in the middle of a polygon shows that none of it is this
+    /// cell's: most polygons are decided so.
+    fn is_below(&self, polygon: &[Vertex], other: &Function, plane: usize) -> bool {
+        let count = polygon.len() as f64;
+        let [x, y] = [0, 1].map(|axis| polygon.iter().map(|v| v.0[axis]).sum::<f64>() / count);
+        let (mut lowest, mut height) = (0, f64::INFINITY);
+        let Planes { gx, gy, c, .. } = &self.planes;
+        for (j, ((gx, gy), c)) in gx.iter().zip(gy).zip(c).enumerate() {
+            let z = gx * x + gy * y + c;
+            if z < height {
+                (lowest, height) = (j, z);
+            }
+        }
+        polygon.iter().all(|v| self.planes.at(lowest, v.0) < other.planes.at(plane, v.0))
     }
 }
 
@@ -164,9 +216,16 @@ impl Scratch {
         self.lost.clear();
         self.cutting.clear();
         let (own, planes) = (&function.planes, &rival.planes);
+        let [mid_x, mid_y] = polygon[0].0;
+        let reach2 = |&([x, y], _): &Vertex| (x - mid_x).powi(2) + (y - mid_y).powi(2);
+        let reach2 = polygon.iter().map(reach2).fold(0.0, f64::max);
         for &j in &rival.seen {
             let (gx, gy, c) =
                 (planes.gx[j] - own.gx[plane], planes.gy[j] - own.gy[plane], planes.c[j] - own.c[plane]);
+            let room = gx * mid_x + gy * mid_y + c;
+            if room > 0.0 && room * room > (gx * gx + gy * gy) * reach2 {
+                continue;
+            }
             let (mut worst, mut best) = (f64::INFINITY, f64::NEG_INFINITY);
             for &([x, y], _) in polygon {
                 let above = gx * x + gy * y + c;

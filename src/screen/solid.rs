@@ -1,6 +1,5 @@
 //! Designed cells as closed solids for CAD and mesh tools.
 
-use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -8,8 +7,8 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::container::{beside, folder};
-use super::pieces::Planes;
 use super::power::Diagram;
+use super::rows::Rows;
 use super::top::{Sketch, Square, Top};
 use super::{Cell, Design, Frame, Seam};
 
@@ -40,9 +39,7 @@ pub struct SolidWriter {
     path: PathBuf,
     out: BufWriter<tempfile::NamedTempFile>,
     triangles: u64,
-    /// Complete rows of cells, the lowest first, and the row that is coming in.
-    rows: VecDeque<Vec<Cell>>,
-    coming: Vec<Cell>,
+    rows: Rows,
     /// Upper sides of the row of squares below, if stitched.
     below: Vec<Vec<[f32; 3]>>,
     outlines: BufWriter<File>,
@@ -78,8 +75,7 @@ impl SolidWriter {
             path: path.to_path_buf(),
             out,
             triangles: 0,
-            rows: VecDeque::new(),
-            coming: Vec::new(),
+            rows: Rows::new(frame),
             below: Vec::new(),
             outlines: BufWriter::with_capacity(1 << 18, outlines),
             lowest: f32::INFINITY,
@@ -88,26 +84,13 @@ impl SolidWriter {
 
     /// Appends the next cell, by row, then column, the ring of a stitched design included.
     pub fn push(&mut self, cell: &Cell) -> Result<(), SolidError> {
-        self.coming.push(cell.clone());
-        if self.coming.len() < self.frame.extent.columns() {
-            return Ok(());
-        }
-        let row = std::mem::take(&mut self.coming);
-        self.rows.push_back(row);
-        let ready = if self.frame.seam == Seam::Step { self.rows.len() } else { self.rows.len() - 1 };
-        if ready > 0 {
-            self.write_row(ready - 1)?;
-            if ready > 1 || self.frame.seam == Seam::Step {
-                self.rows.pop_front();
-            }
-        }
-        Ok(())
+        self.rows.push(cell).map_or(Ok(()), |row| self.write_row(row))
     }
 
     /// Puts the file under its name.
     pub fn finish(mut self) -> Result<(), SolidError> {
-        if self.frame.seam == Seam::Stitched && !self.rows.is_empty() {
-            self.write_row(self.rows.len() - 1)?;
+        if let Some(row) = self.rows.last() {
+            self.write_row(row)?;
         }
         let path = self.path.clone();
         let io = |source| SolidError::Io { path: path.display().to_string(), source };
@@ -131,18 +114,13 @@ impl SolidWriter {
         Ok(())
     }
 
-    /// Writes the tops of one row of squares, if it belongs to the core.
-    fn write_row(&mut self, at: usize) -> Result<(), SolidError> {
+    /// Writes the tops of one row of squares.
+    fn write_row(&mut self, row: i32) -> Result<(), SolidError> {
         let Frame { core, seam, .. } = self.frame;
-        let Some(row) = self.rows[at].first().map(|cell| cell.row) else { return Ok(()) };
-        if !(core.r0..core.r1).contains(&row) {
-            return Ok(());
-        }
         let columns: Vec<i32> = (core.c0..core.c1).collect();
-        let near = Near { rows: &self.rows, frame: &self.frame };
         let sketches: Vec<Sketch> = columns
             .par_iter()
-            .map_init(Diagram::default, |diagram, &column| near.sketch(diagram, column, row))
+            .map_init(Diagram::default, |diagram, &column| self.sketch(diagram, column, row))
             .collect();
         let stitched = seam == Seam::Stitched;
         let tops: Vec<Option<(Top, Outline)>> = sketches
@@ -190,32 +168,10 @@ impl SolidWriter {
     }
 }
 
-/// The rows of cells that are at hand.
-struct Near<'a> {
-    rows: &'a VecDeque<Vec<Cell>>,
-    frame: &'a Frame,
-}
-
-impl Near<'_> {
-    fn cell(&self, column: i32, row: i32) -> Option<&Cell> {
-        let first = self.rows.front()?.first()?;
-        let at = usize::try_from(row - first.row).ok()?;
-        self.rows.get(at)?.get(usize::try_from(column - first.column).ok()?)
-    }
-
+impl SolidWriter {
     fn sketch(&self, diagram: &mut Diagram, column: i32, row: i32) -> Sketch {
-        let Frame { core, cell_mm, profile, seam, .. } = *self.frame;
-        let reach = i32::from(seam == Seam::Stitched);
-        let datum_mm = self.cell(column, row).map_or(0.0, |cell| cell.elevation_mm);
-        let mut planes = Vec::new();
-        // The square's own cell first, then those around it.
-        let around = (-reach..=reach).flat_map(|dr| (-reach..=reach).map(move |dc| (dc, dr)));
-        for (dc, dr) in std::iter::once((0, 0)).chain(around.filter(|&offset| offset != (0, 0))) {
-            if let Some(cell) = self.cell(column + dc, row + dr) {
-                let from = [f64::from(dc) * cell_mm, f64::from(dr) * cell_mm];
-                planes.push(Planes::of(cell, profile, from, datum_mm));
-            }
-        }
+        let Frame { core, cell_mm, profile, seam, .. } = self.frame;
+        let datum_mm = self.rows.cell(column, row).map_or(0.0, |cell| cell.elevation_mm);
         let edge = |at: i32, from: i32| f64::from(at - from) * cell_mm;
         let square = Square {
             low: [edge(column, core.c0), edge(row, core.r0)],
@@ -224,10 +180,10 @@ impl Near<'_> {
             sign: profile.sign(),
         };
         let corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(right, up)| {
-            let own = reach == 0;
+            let own = seam == Seam::Step;
             let cells = [(-1, -1), (0, -1), (-1, 0), (0, 0)].map(|(dc, dr)| {
                 let at = (column + right + dc, row + up + dr);
-                (!own || at == (column, row)).then(|| self.cell(at.0, at.1)).flatten().map(|cell| {
+                (!own || at == (column, row)).then(|| self.rows.cell(at.0, at.1)).flatten().map(|cell| {
                     // Seen from the cell, the corner is on its right if the cell is on the corner's left.
                     let p = [-0.5 - f64::from(dc), -0.5 - f64::from(dr)].map(|share| share * cell_mm);
                     square.sign * cell.height_mm(p, profile)
@@ -235,7 +191,7 @@ impl Near<'_> {
             });
             (square.sign * cells.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max)) as f32
         });
-        Sketch::new(diagram, &planes, &square, corners)
+        Sketch::new(diagram, &self.rows.planes(column, row), &square, corners)
     }
 }
 

@@ -70,6 +70,10 @@ impl Designed {
             return Err(Error::CellSize { cell_mm: design.cell_mm });
         }
         let lattice = covering(size_mm[0], size_mm[1], step_mm)?;
+        if design.cell_mm < 2.0 * step_mm {
+            let (cell_mm, most_mm) = (design.cell_mm, 0.5 * design.cell_mm);
+            return Err(Error::CellBelowStep { cell_mm, step_mm, most_mm });
+        }
         let CellRange { c0, r0, c1, r1 } = material;
         let no_cells = Error::NoCells { c0, r0, c1, r1 };
         let stitched = design.seam == Seam::Stitched;

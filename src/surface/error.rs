@@ -21,6 +21,10 @@ pub enum Error {
     UpName { text: String },
     #[error("the step is {step_mm} mm; hint: a length above 0, as --step-mm 0.01")]
     Step { step_mm: f64 },
+    #[error(
+        "cells of {cell_mm} mm at a step of {step_mm} mm: fewer than two samples across a cell; hint: a step of at most {most_mm} mm"
+    )]
+    CellBelowStep { cell_mm: f64, step_mm: f64, most_mm: f64 },
     #[error("the pixel size is {pixel_mm} mm; hint: a length above 0, as --pixel-mm 0.01")]
     Pixel { pixel_mm: f64 },
     #[error(
