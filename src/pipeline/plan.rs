@@ -143,10 +143,13 @@ pub fn overrun_mm(job: &Job, shape: &Shape, steepest: [f64; 2]) -> f64 {
     reach_mm + 3.0 * job.part.step_mm
 }
 
-/// Metal beside the tile that roughing takes out of the way of the cutters after operation `index`.
+/// Metal beside the tile that roughing takes out of the way of the cutters after operation `index`, and of its own
+/// shank.
 fn clear_mm(job: &Job, shop: &Shop, index: usize, steepest: [f64; 2], cut_mm: f64) -> f64 {
-    let later = shop.tools.iter().zip(&shop.kinds).skip(index + 1);
-    let later = later.filter(|(_, kind)| kind.shapes()).map(|(tool, _)| tool);
+    let deep = |tool: &Tool| tool.body.is_some_and(|body| cut_mm > body.neck_length_mm);
+    let later = shop.tools.iter().zip(&shop.kinds).enumerate().skip(index);
+    let later = later.filter(|(_, (_, kind))| kind.shapes());
+    let later = later.filter(|(nth, (tool, _))| *nth > index || deep(tool)).map(|(_, (tool, _))| tool);
     later.map(|tool| widest_mm(tool, cut_mm) + overrun_mm(job, &tool.shape, steepest)).fold(0.0, f64::max)
 }
 
@@ -160,7 +163,8 @@ pub fn reach_mm(job: &Job, shop: &Shop, steepest: [f64; 2], cut_mm: f64) -> [f64
             job::Kind::Rough => {
                 let clear = clear_mm(job, shop, index, steepest, cut_mm).min(job.stock.margin_mm);
                 let stepover = operation.stepover_mm.unwrap_or(rough::STEPOVER * 2.0 * radius);
-                (radius.max(clear - radius) + job.part.step_mm, stepover)
+                let [along, across] = rough::overrun_mm(radius, stepover, clear);
+                (along.max(across) + job.part.step_mm, stepover)
             }
             job::Kind::Finish | job::Kind::Rest => {
                 (overrun_mm(job, &tool.shape, steepest), operation.stepover_mm.unwrap_or(0.1 * radius))

@@ -83,6 +83,15 @@ pub fn rough(site: &Site, params: &Params, progress: Progress) -> Result<Toolpat
     Ok(path)
 }
 
+/// How far the axis goes past the part along the rows and across them, in mm: until the part is out of reach, so that
+/// the margin can be cut as deep as the part's border, and farther where `clear_mm` of metal around the part has
+/// to go. Along the rows it goes until no fin is left between the ends of two of them: a fin as high as the
+/// part is deep would stand in the way of a shank.
+pub fn overrun_mm(radius_mm: f64, stepover_mm: f64, clear_mm: f64) -> [f64; 2] {
+    let between_mm = (radius_mm * radius_mm - 0.25 * stepover_mm * stepover_mm).max(0.0).sqrt();
+    [between_mm, radius_mm].map(|covered_mm| radius_mm.max(clear_mm - covered_mm))
+}
+
 fn layout(site: &Site, params: &Params) -> Result<(Layout, i32), Error> {
     site.validate(0.0)?;
     let (along, slope) = Axis::from_deg(params.direction_deg)?;
@@ -109,13 +118,10 @@ fn layout(site: &Site, params: &Params) -> Result<(Layout, i32), Error> {
         let hint = "a stepover_mm of at least one unit";
         return Err(Error::StepoverUnit { stepover_mm, unit_mm: site.unit_mm, hint });
     }
-    // The axis goes out until the part is out of reach, so that the margin can be cut as deep as the part's
-    // border, and farther where the clearing asks for more.
-    let out_mm = radius.max(params.clear_mm.min(site.margin_mm) - radius)
-        + site.surface.lattice().step_mm
-        + site.unit_mm;
-    site.validate(out_mm + stepover_mm + 2.0 * radius)?;
-    let layout = Layout::covering(site, (along, slope), stepover as i32, [out_mm; 2]);
+    let out_mm = overrun_mm(radius, stepover_mm, params.clear_mm.min(site.margin_mm))
+        .map(|mm| mm + site.surface.lattice().step_mm + site.unit_mm);
+    site.validate(out_mm[0].max(out_mm[1] + stepover_mm) + 2.0 * radius)?;
+    let layout = Layout::covering(site, (along, slope), stepover as i32, out_mm);
     Ok((layout, stepdown.min(f64::from(i32::MAX)) as i32))
 }
 
