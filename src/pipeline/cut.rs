@@ -195,7 +195,6 @@ fn judged(
             programs.map(|p| Judged::new(&p.reading, shop.tools[p.operation].shape, zero_mm)).collect()
         })
         .collect();
-    progress.begin("shanks", 1);
     let nose_mm = shop.machine.spindle.nose_diameter_mm;
     let cutters = distinct(reaching(shop).into_iter(), step_mm)?;
     let (names, candidates) = candidates(shop, step_mm)?;
@@ -229,6 +228,7 @@ fn judged(
     let at = &tile.setup.tile;
     let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;
     draw_means(staging, job, &tile, &verdict, lattice.step_mm)?;
+    progress.begin("shanks", 1);
     let mut motions = Vec::new();
     let mut slots = Vec::new();
     for (nth, (post, judged)) in posts.iter().zip(&judged).enumerate() {

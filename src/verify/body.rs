@@ -5,6 +5,7 @@
 
 use super::judged::{Blank, CHUNK, Judged};
 use super::reading::{Motion, Reading};
+use super::skyline::Skyline;
 use super::sweep;
 use crate::grid::{Heights, Window};
 use crate::machine::Cylinder;
@@ -50,13 +51,14 @@ pub fn body_hits(blank: &Blank, programs: &[Judged], bodies: &[Vec<Cylinder>]) -
         rows: (high[1] - low[1]).max(0) as usize,
     };
     let stock = blank.heights(window, step_mm, blank.top_mm);
-    let mut metal = Metal { heights: stock, step_mm, datum_mm: blank.top_mm };
+    let mut metal = Metal { skyline: Skyline::new(&stock), heights: stock, step_mm, datum_mm: blank.top_mm };
     for index in 0..=last {
         let judged = &programs[index];
         if deep[index] {
             hits[index] = metal.follow(judged, &bodies[index]);
         } else {
             metal.heights = sweep(metal.heights, step_mm, blank.top_mm, std::slice::from_ref(judged)).heights;
+            metal.skyline = Skyline::new(&metal.heights);
         }
     }
     hits
@@ -71,6 +73,7 @@ fn deep(blank: &Blank, judged: &Judged, body: &[Cylinder]) -> bool {
 
 struct Metal {
     heights: Heights,
+    skyline: Skyline,
     step_mm: f64,
     datum_mm: f64,
 }
@@ -126,6 +129,7 @@ impl Metal {
             let start = (row - whole.row) as usize * whole.columns + (window.column - whole.column) as usize;
             self.heights.z_mm[start..start + window.columns].copy_from_slice(cut.row(row));
         }
+        self.skyline.renew(&self.heights, window);
     }
 
     fn hit(&self, judged: &Judged, body: &[Cylinder], index: usize) -> Option<BodyHit> {
@@ -159,6 +163,10 @@ impl Metal {
         let low: [f64; 2] = std::array::from_fn(|axis| from[axis].min(to[axis]) - radius);
         let high: [f64; 2] = std::array::from_fn(|axis| from[axis].max(to[axis]) + radius);
         let window = self.window(low, high)?;
+        let highest = f64::from(self.skyline.highest(self.heights.window, window)) + self.datum_mm;
+        if highest - from[2].min(to[2]) - cylinder.from_mm <= DEPTH_MM {
+            return None;
+        }
         let along = [to[0] - from[0], to[1] - from[1]];
         let length = along[0].hypot(along[1]);
         let u = if length > 0.0 { along.map(|v| v / length) } else { [0.0; 2] };

@@ -9,6 +9,7 @@ mod gcode;
 mod judged;
 mod reading;
 mod rml;
+mod skyline;
 mod sweep;
 mod text;
 mod time;
