@@ -89,6 +89,8 @@ fn every_sample_is_cut_without_a_gouge() {
 fn accepted(program: &Path) {
     let folder = program.parent().expect("a folder");
     let mut rs274 = Command::new("rs274");
+    // It keeps its tool table in the home folder.
+    rs274.env("HOME", folder);
     let read =
         rs274.arg("-g").arg(program).current_dir(folder).stdin(Stdio::null()).output().expect("rs274 runs");
     let said = String::from_utf8_lossy(&read.stderr);

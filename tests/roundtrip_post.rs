@@ -238,6 +238,7 @@ fn linuxcnc_reads_it_as_meant() {
         .arg("-g")
         .arg(&file)
         .current_dir(folder.path())
+        .env("HOME", folder.path())
         .stdin(std::process::Stdio::null())
         .output()
         .expect("rs274 runs");

@@ -60,6 +60,8 @@ fn accepted(bench: &Bench, file: &str) {
         .arg("-g")
         .arg(bench.path("out").join(file))
         .current_dir(bench.path("out"))
+        // It keeps its tool table there, and two at once would cut it off under each other.
+        .env("HOME", bench.path("out"))
         .stdin(Stdio::null())
         .output()
         .expect("rs274 runs");
