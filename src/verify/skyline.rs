@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn the_highest_of_blocks_is_never_below_that_of_samples_and_falls_as_they_fall() {
         let window = Window { column: -7, row: 5, columns: 53, rows: 37 };
-        let z = |i: usize| if i % 11 == 0 { f32::NAN } else { (i * 7919 % 1000) as f32 };
+        let z = |i: usize| if i.is_multiple_of(11) { f32::NAN } else { (i * 7919 % 1000) as f32 };
         let mut heights = Heights { window, z_mm: (0..window.samples()).map(z).collect() };
         let mut skyline = Skyline::new(&heights);
         let part = Window { column: 9, row: 21, columns: 16, rows: 16 };
