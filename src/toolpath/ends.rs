@@ -15,13 +15,14 @@
 //! the funnel of slopes that stay between the bounds, and the sums of the least squares kept as it goes.
 
 use super::funnel::{Vertex, straighten};
+use super::table::Table;
 
 /// Both flanks of a pass turn when it is off, each by the difference of two passes: between once and four times
 /// the square of one. The light of a designed tile is best at four, and flat from there on.
-const FLANKS: f64 = 4.0;
+pub(super) const FLANKS: f64 = 4.0;
 
 /// What a move costs, in square radians times mm: half a degree over a quarter of a millimetre.
-const BLOCK: f64 = 2e-5;
+pub(super) const BLOCK: f64 = 2e-5;
 
 /// What the squares are measured in.
 #[derive(Clone, Copy, Debug)]
@@ -32,39 +33,6 @@ pub(super) struct Measure {
     pub(super) stepover_mm: f64,
     /// Radius of the cutter's round tip; 0 without one.
     pub(super) tip_mm: f64,
-}
-
-/// A grid point between the bounds and the cheapest way to it.
-#[derive(Clone, Copy)]
-struct State {
-    z: i32,
-    cost: f64,
-    from: (u32, u8),
-}
-
-/// What a position asks of the moves that come by.
-#[derive(Clone, Copy)]
-struct Position {
-    w: f64,
-    g: f64,
-    exact: f64,
-    low: f64,
-    high: f64,
-    /// 1 over its distance from the first.
-    part: f64,
-    /// First and one past the last of its states.
-    states: [usize; 2],
-}
-
-/// Sums over the positions behind a state, d positions away and q above it.
-#[derive(Clone, Copy, Default)]
-struct Sums {
-    w: f64,
-    wd2: f64,
-    wdq: f64,
-    wq2: f64,
-    wg: f64,
-    wg2: f64,
 }
 
 /// How much of the surface each position makes, 0 to 1: the contact moves by 1 + r z'' of what the axis does.
@@ -81,91 +49,12 @@ pub(super) fn weights(exact: &[f64], measure: &Measure) -> Vec<f64> {
 /// Vertices within `low[i] ..= high[i]` (units) at every position, from the first to the last, that follow
 /// `exact` best. The bounds must be a unit apart.
 pub(super) fn lay(low: &[f64], high: &[f64], exact: &[f64], measure: &Measure) -> Vec<Vertex> {
-    let count = low.len();
-    let Some(last) = count.checked_sub(1) else { return Vec::new() };
-    let weights = weights(exact, measure);
-    let slope_cost = (measure.unit_mm / measure.pitch_mm).powi(2);
-    let height_cost = FLANKS * (measure.unit_mm / measure.stepover_mm).powi(2);
-    let block = BLOCK / measure.pitch_mm;
-    let mut states: Vec<State> = Vec::with_capacity(2 * count);
-    let mut starts: Vec<usize> = Vec::with_capacity(count + 1);
-    for i in 0..count {
-        starts.push(states.len());
-        let first = low[i].ceil() as i32;
-        let cost = if i == 0 { 0.0 } else { f64::INFINITY };
-        for z in first..=(high[i].floor() as i32).max(first) {
-            states.push(State { z, cost, from: (0, 0) });
-        }
+    if low.is_empty() {
+        return Vec::new();
     }
-    starts.push(states.len());
-    let positions: Vec<Position> = (1..count)
-        .map(|j| Position {
-            w: weights[j],
-            g: exact[j] - exact[j - 1],
-            exact: exact[j],
-            low: low[j],
-            high: high[j],
-            part: 1.0 / j as f64,
-            states: [starts[j], starts[j + 1]],
-        })
-        .collect();
-    for i in 0..last {
-        for nth in starts[i]..starts[i + 1] {
-            let State { z, cost, .. } = states[nth];
-            let z = f64::from(z);
-            // No move from here costs less than this.
-            let at_least = cost + block;
-            let (mut least, mut most) = (f64::NEG_INFINITY, f64::INFINITY);
-            let mut sums = Sums::default();
-            let mut d = 0.0;
-            for (position, distance) in positions[i..].iter().zip(&positions) {
-                d += 1.0;
-                let Position { w, g, exact, low, high, states: [first, end], .. } = *position;
-                let q = exact - z;
-                sums.w += w;
-                sums.wd2 += w * d * d;
-                sums.wdq += w * d * q;
-                sums.wq2 += w * q * q;
-                sums.wg += w * g;
-                sums.wg2 += w * g * g;
-                let part = distance.part;
-                for state in &mut states[first..end] {
-                    if at_least >= state.cost {
-                        continue;
-                    }
-                    let s = (f64::from(state.z) - z) * part;
-                    if s < least || s > most {
-                        continue;
-                    }
-                    let turned = s * s * sums.w - 2.0 * s * sums.wg + sums.wg2;
-                    let raised = s * s * sums.wd2 - 2.0 * s * sums.wdq + sums.wq2;
-                    let cost = at_least + slope_cost * turned.max(0.0) + height_cost * raised.max(0.0);
-                    if cost < state.cost {
-                        *state = State { cost, from: (i as u32, (nth - starts[i]) as u8), ..*state };
-                    }
-                }
-                least = least.max((low - z) * part);
-                most = most.min((high - z) * part);
-                if least > most {
-                    break;
-                }
-            }
-        }
-    }
-    let mut out = Vec::new();
-    let ends = &states[starts[last]..];
-    let best = (0..ends.len()).min_by(|&a, &b| ends[a].cost.total_cmp(&ends[b].cost)).unwrap_or(0);
-    let mut at = (last, best);
-    loop {
-        let state = states[starts[at.0] + at.1];
-        out.push((at.0, state.z));
-        if at.0 == 0 {
-            break;
-        }
-        at = (state.from.0 as usize, usize::from(state.from.1));
-    }
-    out.reverse();
-    straighten(out)
+    let mut table = Table::new(low, high, exact, measure);
+    table.fill();
+    straighten(table.best())
 }
 
 #[cfg(test)]

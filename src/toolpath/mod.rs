@@ -9,6 +9,7 @@
 //! the last step, to whole units, moves z to the program's zero.
 
 pub mod beside;
+mod eight;
 mod ends;
 mod envelope;
 pub mod finish;
@@ -21,6 +22,7 @@ mod rest;
 pub mod rough;
 mod slant;
 mod strip;
+mod table;
 mod tilt;
 
 pub use passes::{Axis, Layout};
