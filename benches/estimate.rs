@@ -8,7 +8,7 @@ use std::time::Instant;
 use screenmill::machine::{Library, Machine};
 use screenmill::post::{self, Dialect, Program, StockFacts, ZZero};
 use screenmill::toolpath::{Kind, Move, Toolpath};
-use screenmill::verify::{self, Clock, Kinematics, Options};
+use screenmill::verify::{self, Clock, Kinematics, Options, Travel};
 
 /// The text of a wavy relief in blocks of 0.05 mm, made as it is read, so that no memory holds it.
 struct Relief {
@@ -113,7 +113,7 @@ fn main() {
     println!("{millions} million blocks; making the text is taken off ({making:.1} s)");
     for (name, head) in modes {
         let machine = Machine::find(name, None).expect("a machine that comes along");
-        let mut clock = Clock::new(&Kinematics::from(&machine), None);
+        let mut clock = Clock::new(&Kinematics::from(&machine), Travel::default());
         let start = Instant::now();
         let summary = verify::read(&mut relief(blocks, head), &Options::default(), &mut |event| {
             clock.event(event);

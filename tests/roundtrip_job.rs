@@ -351,25 +351,30 @@ fn strays(a: &[[f64; 3]], b: &[[f64; 3]]) -> (f64, [f64; 3]) {
 }
 
 /// The passes of a finish are the same curve in every dialect, links included: no place of one is farther from the
-/// other than a unit of the coarser grid and what simplification may take in each.
+/// other than a unit of the coarser grid and what simplification may take in each. Cuts faster than the axis of Z
+/// are told from travels in both.
 #[test]
 fn gcode_and_rml_move_along_the_same_curve() {
     let finish = "tool = \"ball-1\"\nstepover_mm = 0.1";
     let of = |machine: &str, pattern: &str, unit_mm: f64| {
-        let wanted = format!("{finish}\npattern = \"{pattern}\"");
+        let wanted = format!("{finish}\npattern = \"{pattern}\"\nfeed_mm_min = 1200");
         let bench = Bench::with(&[("name = \"linuxcnc-mill\"", machine), (finish, &wanted)]);
         let report = bench.mill(0);
         let simplify = report["fidelity"]["gouge_budget_mm"]["simplify"].as_f64().expect("a share");
-        (path(&bench, 1, unit_mm), simplify)
+        let length = |key: &str| report["tiles"][0]["programs"][1][key].as_f64().expect("mm");
+        (path(&bench, 1, unit_mm), simplify, [length("cutting_mm"), length("rapid_mm")])
     };
     for pattern in ["zigzag", "one-way"] {
-        let (gcode, first) = of("name = \"linuxcnc-mill\"", pattern, 0.01);
-        let (rml, second) = of("name = \"roland-egx-600\"", pattern, 0.01);
+        let (gcode, first, gcode_mm) = of("name = \"linuxcnc-mill\"", pattern, 0.01);
+        let (rml, second, rml_mm) = of("name = \"roland-egx-600\"", pattern, 0.01);
         let most = 0.01 + first + second;
         for (a, b) in [(&gcode, &rml), (&rml, &gcode)] {
             let (distance, at) = strays(a, b);
             assert!(distance <= most, "{pattern}: {distance} of {most} at {at:?}");
         }
+        assert!((rml_mm[0] / gcode_mm[0] - 1.0).abs() < 0.01, "{pattern}: {rml_mm:?} and {gcode_mm:?}");
+        // The G-code parks at the back left corner of 4 x 4 mm and its overrun.
+        assert!((gcode_mm[1] - rml_mm[1]).abs() < 20.0, "{pattern}: {rml_mm:?} and {gcode_mm:?}");
     }
 }
 

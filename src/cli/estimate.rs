@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use screenmill::job::Job;
 use screenmill::machine::Machine;
 use screenmill::pipeline;
-use screenmill::verify::{Clock, Event, Extent, Kinematics, Language, Options, Summary, Timing};
+use screenmill::verify::{
+    Clock, Event, Extent, Kinematics, Language, Options, Summary, Timing, Travel, TravelSearch,
+};
 use serde_json::{Map, Value, json};
 
 use super::console::Console;
@@ -144,7 +146,7 @@ fn job(path: &Path, common: &Common) -> Result<Outcome, Refusal> {
 }
 
 fn estimate(path: &Path, options: &Options, kinematics: &Kinematics) -> Result<Estimated, Refused> {
-    let travel = travel_mm_min(path, options)?;
+    let travel = travel(path, options)?;
     let mut timer = Clock::new(kinematics, travel);
     let mut extent = Extent::with_travel(travel);
     let summary = stream(path, options, &mut |event| {
@@ -157,18 +159,18 @@ fn estimate(path: &Path, options: &Options, kinematics: &Kinematics) -> Result<E
     Ok(Estimated { summary, extent, timing })
 }
 
-/// RML-1 has no rapids, so its travel speed has to be found before the text is timed.
-fn travel_mm_min(path: &Path, options: &Options) -> Result<Option<f32>, Refused> {
+/// RML-1 has no rapids, so its travels have to be found before the text is timed.
+fn travel(path: &Path, options: &Options) -> Result<Travel, Refused> {
     if language(path)? != Language::Rml1 {
-        return Ok(None);
+        return Ok(Travel::default());
     }
-    let mut travel = screenmill::verify::Travel::default();
+    let mut search = TravelSearch::default();
     stream(path, options, &mut |event| {
         if let Event::Move(motion) = event {
-            travel.add(motion);
+            search.add(motion);
         }
     })?;
-    Ok(travel.mm_min())
+    Ok(search.found())
 }
 
 fn parts(limits: &[(&'static str, f64)]) -> Value {

@@ -135,6 +135,13 @@ pub fn of_rounding(result: &TileResult, program: &Program) -> Option<Remark> {
     Some(note.at(&result.in_part(worst.at_mm)))
 }
 
+/// A length with as many decimals, three at most, as set it apart from the limit that it is over.
+fn shown(length: f64, limit: f64) -> String {
+    let exceeds = |text: &String| text.parse().is_ok_and(|value: f64| value > limit);
+    let texts = (0..3).map(|decimals| format!("{length:.decimals$}"));
+    texts.into_iter().find(exceeds).unwrap_or_else(|| format!("{length:.3}"))
+}
+
 /// What a program asks of its cutter, and what its reader noticed.
 pub fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> {
     let tool = &shop.tools[program.operation];
@@ -154,7 +161,8 @@ pub fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> 
         && length_m > life_m
     {
         let message = format!(
-            "{length_m:.0} m of cut without a retract, {} lasts {life_m} m; hint: pattern = \"one-way\" can be cut in sections at every pass",
+            "{} m of cut without a retract, {} lasts {life_m} m; hint: pattern = \"one-way\" can be cut in sections at every pass",
+            shown(length_m, life_m),
             tool.name
         );
         found.push(Remark::new(Severity::Warning, "tool-life", None, message));
@@ -166,14 +174,13 @@ pub fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> 
         );
         found.push(Remark::new(Severity::Note, "sections", None, message));
     }
-    // RML-1 has no rapid word, so that its travel above the part is a feed like any other.
     let gcode = program.reading.summary.language == Language::GCode;
     let feeds = Judged::new(&program.reading, tool.shape, [0.0; 3]).feeds();
     for (fastest, most, key) in [
         (feeds.lateral, tool.feed_mm_min, "feed_mm_min"),
         (feeds.plunge, tool.plunge_mm_min, "plunge_mm_min"),
     ] {
-        if let Some(fastest) = fastest.filter(|fastest| gcode && fastest.feed_mm_min > most + 1e-3) {
+        if let Some(fastest) = fastest.filter(|fastest| fastest.feed_mm_min > most + 1e-3) {
             let message =
                 format!("feeds {} mm/min, the {key} of {} is {most}", fastest.feed_mm_min, tool.name);
             found.push(Remark::new(Severity::Warning, "feed", Some(fastest.line), message));

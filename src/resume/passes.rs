@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use crate::verify::{Motion, Reading};
+use crate::verify::Reading;
 
 /// Heights closer than this are one plane, in mm.
 const SAME_MM: f64 = 1e-6;
@@ -46,8 +46,7 @@ pub(super) fn passes(text: &[u8], reading: &Reading) -> Vec<Pass> {
 
 /// The highest plane on which the program travels more than once; the only one if there is but one.
 fn plane_mm(reading: &Reading) -> Option<f64> {
-    let travel = reading.travel_mm_min();
-    let fast = |motion: &Motion| motion.rapid() || travel.is_some_and(|speed| motion.feed_mm_min >= speed);
+    let travel = reading.travel();
     let mut planes: BTreeMap<i64, (f64, usize)> = BTreeMap::new();
     for pair in reading.motions.windows(2) {
         let (from, to) = (pair[0].to_mm, pair[1].to_mm);
@@ -55,7 +54,7 @@ fn plane_mm(reading: &Reading) -> Option<f64> {
         if pair[0].known()
             && pair[1].known()
             && lateral
-            && fast(&pair[1])
+            && travel.holds(from, &pair[1])
             && (from[2] - to[2]).abs() < SAME_MM
         {
             planes.entry((to[2] / SAME_MM).round() as i64).or_insert((to[2], 0)).1 += 1;

@@ -1,4 +1,5 @@
 use super::judged::Judged;
+use super::reading::Language;
 
 /// The fastest motion of a kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,27 +18,30 @@ pub struct Feeds {
 }
 
 impl Judged<'_> {
-    /// The fastest feed motions, each the first of equals; rapids, and travel in RML-1, are none.
+    /// The fastest feed motions between known places, each the first of equals; rapids, and travels in
+    /// RML-1, are none. Descents of an RML-1 text whose speeds do not tell plunges apart are left out.
     pub fn feeds(&self) -> Feeds {
         let mut feeds = Feeds::default();
         let mut last = [f64::NAN; 3];
-        for motion in &self.reading.motions {
-            let to = motion.to_mm;
-            // The first motion from an unknown place counts as lateral.
-            let lateral = to[0] != last[0] || to[1] != last[1];
-            let kind = match (lateral, to[2] < last[2]) {
+        let gcode = self.reading.summary.language == Language::GCode;
+        for (index, motion) in self.reading.motions.iter().enumerate() {
+            let (from, to) = (std::mem::replace(&mut last, motion.to_mm), motion.to_mm);
+            if !motion.known() || from.iter().any(|mm| mm.is_nan()) {
+                continue;
+            }
+            let lateral = to[0] != from[0] || to[1] != from[1];
+            let kind = match (lateral, to[2] < from[2]) {
                 (true, _) => Some(&mut feeds.lateral),
-                (false, true) => Some(&mut feeds.plunge),
-                (false, false) => None,
+                (false, true) if gcode || self.travel.tells_plunges() => Some(&mut feeds.plunge),
+                _ => None,
             };
             let feed_mm_min = f64::from(motion.feed_mm_min);
             if let Some(kind) = kind
-                && !self.rapid(motion)
+                && !self.rapid(index)
                 && kind.is_none_or(|fastest| feed_mm_min > fastest.feed_mm_min)
             {
                 *kind = Some(Fastest { feed_mm_min, line: motion.line });
             }
-            last = to;
         }
         feeds
     }

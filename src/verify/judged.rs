@@ -1,4 +1,5 @@
-use super::reading::{Motion, Reading};
+use super::reading::Reading;
+use super::travel::Travel;
 use crate::cutter::Shape;
 use crate::grid::{Heights, Window};
 
@@ -11,8 +12,7 @@ pub struct Judged<'a> {
     pub reading: &'a Reading,
     pub shape: Shape,
     pub zero_mm: [f64; 3],
-    /// Feed motions at this speed or faster count as rapids (RML-1 has no rapid word).
-    pub travel_mm_min: Option<f32>,
+    pub(super) travel: Travel,
     /// Lowest and highest x and y of each chunk's path in the part frame, without the cutter.
     pub(super) chunks: Vec<[[f64; 2]; 2]>,
 }
@@ -40,11 +40,14 @@ impl<'a> Judged<'a> {
             }
             chunks.push([low, high]);
         }
-        Judged { reading, shape, zero_mm, travel_mm_min: reading.travel_mm_min(), chunks }
+        Judged { reading, shape, zero_mm, travel: reading.travel(), chunks }
     }
 
-    pub(super) fn rapid(&self, motion: &Motion) -> bool {
-        motion.rapid() || self.travel_mm_min.is_some_and(|speed| motion.feed_mm_min >= speed)
+    /// Whether motion `index` goes at the speed of travels, which metal does not bear.
+    pub(super) fn rapid(&self, index: usize) -> bool {
+        let motions = &self.reading.motions;
+        let from_mm = index.checked_sub(1).map_or([f64::NAN; 3], |before| motions[before].to_mm);
+        self.travel.fast(from_mm, &motions[index])
     }
 
     /// Lowest and highest x and y of the feed motions in the part frame, without the cutter; None if
@@ -52,8 +55,8 @@ impl<'a> Judged<'a> {
     pub fn worked_mm(&self) -> Option<[[f64; 2]; 2]> {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         let mut last = [f64::NAN; 3];
-        for motion in &self.reading.motions {
-            if !self.rapid(motion) {
+        for (index, motion) in self.reading.motions.iter().enumerate() {
+            if !self.rapid(index) {
                 for axis in 0..2 {
                     let (from, to) =
                         (last[axis] + self.zero_mm[axis], motion.to_mm[axis] + self.zero_mm[axis]);
@@ -72,11 +75,11 @@ impl<'a> Judged<'a> {
         let reach = self.shape.radius_mm();
         let mut worst: Option<LateralRapid> = None;
         let mut last = [f64::NAN; 3];
-        for motion in &self.reading.motions {
+        for (index, motion) in self.reading.motions.iter().enumerate() {
             let to: [f64; 3] = std::array::from_fn(|axis| motion.to_mm[axis] + self.zero_mm[axis]);
             // NaN differs from everything, so leaving for home counts as lateral.
             let lateral = last[0].is_finite() && (to[0] != last[0] || to[1] != last[1]);
-            if lateral && self.rapid(motion) && last[2].is_finite() {
+            if lateral && self.rapid(index) && last[2].is_finite() {
                 let low = last[2].min(to[2]);
                 let over = (0..2).all(|axis| {
                     let (from, until) = (last[axis].min(to[axis]), last[axis].max(to[axis]));

@@ -13,12 +13,14 @@ mod skyline;
 mod sweep;
 mod text;
 mod time;
+mod travel;
 
 pub use body::{BodyHit, body_hits};
 pub use error::{Error, Place};
 pub use feeds::{Fastest, Feeds};
 pub use judged::{Blank, Judged, LateralRapid};
-pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary, Travel};
+pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary};
 pub use sweep::{Bite, ProgramCut, Swept, sweep};
 pub use text::{language, read};
 pub use time::{Clock, Corner, Kinematics, Timing, time};
+pub use travel::{Travel, TravelSearch};

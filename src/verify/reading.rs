@@ -1,6 +1,7 @@
 use std::fmt;
 
 use super::Error;
+use super::travel::{Travel, TravelSearch};
 
 /// A straight motion from where the last one ended, in the program frame. An axis that the text has
 /// not named yet, or that stands at the machine's home, is NaN.
@@ -210,65 +211,25 @@ impl Reading {
         }
     }
 
-    /// Length sums and bounds; RML-1's travel motions count as rapids.
+    /// Length sums and bounds; RML-1's travels count as rapids.
     pub fn extent(&self) -> Extent {
-        let mut extent = Extent::with_travel(self.travel_mm_min());
+        let mut extent = Extent::with_travel(self.travel());
         for motion in &self.motions {
             extent.add(motion);
         }
         extent
     }
 
-    /// The speed at which an RML-1 program travels (see [`Travel`]); None for G-code, which has rapids.
-    pub fn travel_mm_min(&self) -> Option<f32> {
+    /// What tells the travels of an RML-1 program from its cuts; G-code has rapids.
+    pub fn travel(&self) -> Travel {
         if self.summary.language != Language::Rml1 {
-            return None;
+            return Travel::default();
         }
-        let mut travel = Travel::default();
+        let mut search = TravelSearch::default();
         for motion in &self.motions {
-            travel.add(motion);
-            if travel.slower {
-                break;
-            }
+            search.add(motion);
         }
-        travel.mm_min()
-    }
-}
-
-/// Finds the travel speed of an RML-1 program, motion by motion. RML-1 has no rapid word for three
-/// axes: its travel speed is that of the first motion that names X and Y, if a later lateral motion
-/// is slower.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Travel {
-    last: [f64; 3],
-    first: Option<f32>,
-    slower: bool,
-}
-
-impl Default for Travel {
-    fn default() -> Travel {
-        Travel { last: [f64::NAN; 3], first: None, slower: false }
-    }
-}
-
-impl Travel {
-    /// Takes the next motion in.
-    pub fn add(&mut self, motion: &Motion) {
-        let (to, last) = (motion.to_mm, self.last);
-        let known = |p: &[f64; 3]| p[0].is_finite() && p[1].is_finite();
-        match self.first {
-            None if known(&to) => self.first = Some(motion.feed_mm_min),
-            Some(first) if known(&last) && (to[0] != last[0] || to[1] != last[1]) => {
-                self.slower |= motion.feed_mm_min < first;
-            }
-            _ => {}
-        }
-        self.last = to;
-    }
-
-    /// The travel speed; None without one, and where the text has true rapids (PU, M).
-    pub fn mm_min(&self) -> Option<f32> {
-        self.first.filter(|first| self.slower && first.is_finite())
+        search.found()
     }
 }
 
@@ -281,8 +242,7 @@ pub struct Extent {
     /// Lengths of feed motions and of rapids between known points.
     pub cutting_mm: f64,
     pub rapid_mm: f64,
-    /// Feed motions at this speed or faster count as rapids: RML-1 has no rapid word.
-    pub travel_mm_min: Option<f32>,
+    travel: Travel,
     last: [f64; 3],
 }
 
@@ -293,16 +253,16 @@ impl Default for Extent {
             high_mm: [f64::NEG_INFINITY; 3],
             cutting_mm: 0.0,
             rapid_mm: 0.0,
-            travel_mm_min: None,
+            travel: Travel::default(),
             last: [f64::NAN; 3],
         }
     }
 }
 
 impl Extent {
-    /// Nothing yet; feed motions at `travel_mm_min` or faster will count as rapids.
-    pub fn with_travel(travel_mm_min: Option<f32>) -> Extent {
-        Extent { travel_mm_min, ..Extent::default() }
+    /// Nothing yet; travels will count as rapids.
+    pub fn with_travel(travel: Travel) -> Extent {
+        Extent { travel, ..Extent::default() }
     }
 
     /// Takes the next motion in.
@@ -311,8 +271,7 @@ impl Extent {
         let delta: [f64; 3] = std::array::from_fn(|axis| to[axis] - self.last[axis]);
         let length = (delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2]).sqrt();
         if length.is_finite() {
-            let travel = self.travel_mm_min.is_some_and(|speed| motion.feed_mm_min >= speed);
-            if motion.rapid() || travel {
+            if self.travel.holds(self.last, motion) {
                 self.rapid_mm += length;
             } else {
                 self.cutting_mm += length;

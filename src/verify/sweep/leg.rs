@@ -47,7 +47,7 @@ impl Leg {
         let from = known.map_or(to, |m| place(m.to_mm));
         let delta: [f64; 3] = std::array::from_fn(|axis| to[axis] - from[axis]);
         let length = delta[0].hypot(delta[1]);
-        let rapid = judged.rapid(motion);
+        let rapid = judged.rapid(index);
         let vertical = length < SHORT_MM;
         let class = match (rapid, vertical && delta[2] < 0.0) {
             (true, _) => Class::Rapid,

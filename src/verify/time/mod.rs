@@ -9,6 +9,7 @@ mod round;
 use glam::DVec3;
 
 use super::reading::{Event, Reading};
+use super::travel::Travel;
 use linuxcnc::{Controller, Limits};
 use round::{Chords, Round};
 
@@ -112,7 +113,7 @@ impl Timing {
 
 /// Times a whole reading.
 pub fn time(reading: &Reading, machine: &Kinematics) -> Timing {
-    let mut clock = Clock::new(machine, reading.travel_mm_min());
+    let mut clock = Clock::new(machine, reading.travel());
     reading.replay(&mut |event| clock.event(event));
     clock.finish(reading.summary.bytes)
 }
@@ -125,7 +126,8 @@ enum Planner {
 /// Times a program event by event.
 pub struct Clock {
     machine: Kinematics,
-    travel_mm_min: Option<f32>,
+    travel: Travel,
+    last_mm: [f64; 3],
     at_mm: DVec3,
     arc: Option<Chords>,
     planner: Planner,
@@ -133,9 +135,8 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// A clock at the start of a program, with the machine at its zero. Feed motions at
-    /// `travel_mm_min` or faster count as rapids.
-    pub fn new(machine: &Kinematics, travel_mm_min: Option<f32>) -> Clock {
+    /// A clock at the start of a program, with the machine at its zero; travels count as rapids.
+    pub fn new(machine: &Kinematics, travel: Travel) -> Clock {
         let planner = match machine.corner {
             Corner::Blend { mm } => {
                 Planner::Controller(Box::new(Controller::new(limits(machine), DVec3::ZERO, mm)))
@@ -144,7 +145,8 @@ impl Clock {
         };
         Clock {
             machine: *machine,
-            travel_mm_min,
+            travel,
+            last_mm: [f64::NAN; 3],
             at_mm: DVec3::ZERO,
             arc: None,
             planner,
@@ -159,9 +161,10 @@ impl Clock {
                 // An axis that is not known yet, or stands at home, is where it was.
                 let to: DVec3 = DVec3::from_array(motion.to_mm);
                 let to = DVec3::select(to.is_finite_mask(), to, self.at_mm);
-                let travel = self.travel_mm_min.is_some_and(|speed| motion.feed_mm_min >= speed);
+                let travel = self.travel.holds(self.last_mm, &motion);
+                self.last_mm = motion.to_mm;
                 let feed = (!motion.rapid()).then(|| f64::from(motion.feed_mm_min) / 60.0);
-                self.go(to, feed, motion.rapid() || travel);
+                self.go(to, feed, travel);
             }
             Event::Arc { radius_mm, chords } => {
                 self.arc = (chords > 1).then(|| Chords::new(self.at_mm, radius_mm, chords));
