@@ -40,7 +40,10 @@ fn units_distances_and_spelling_do_not_matter() {
         PLAIN,
         "%\nO0001 \n(part)\ng21g90g017m03\nN10 g00 z + 5.\nN20 x0y0\ng01z-.5f300 ; down\nX2 5.4Y12.70(along)\nx-01.5\ng0z5\nm02\nG1 X99\n",
     );
-    same(PLAIN, &PLAIN.replace('\n', "\r\n"));
+    for end in ["\r\n", "\r"] {
+        same(PLAIN, &PLAIN.replace('\n', end));
+        assert_eq!(lines_of(PLAIN), lines_of(&PLAIN.replace('\n', end)));
+    }
     same(PLAIN, &(PLAIN.replace("M2\n", "%\n").replace("G21", "%\nG21")));
 }
 
@@ -49,6 +52,35 @@ fn numbers_are_the_nearest_doubles() {
     let reading = read("G21 G90\nG0 X0.1 Y-123.4567 Z25.0001\nG0 X0.30000000000000004\nM2\n");
     assert_eq!(ends(&reading)[0], [0.1, -123.4567, 25.0001]);
     assert!((ends(&reading)[1][0] - 0.3).abs() < 1e-15);
+}
+
+fn lines_of(text: &str) -> Vec<u32> {
+    read(text).motions.iter().map(|motion| motion.line).collect()
+}
+
+/// Old editors and some senders end lines with CR alone; a stopped program is taken up in its own ends.
+#[test]
+fn lone_carriage_returns_end_lines() {
+    let rml = "^DF\n^PA\nV15.0\n!MC1\n!ZM200\nZ0,0,200\nZ0,0,-100\nV5.0\nZ100,0,-100\nV15.0\nZ100,0,200\nV30.0\n\
+        Z0,50,200\nV15.0\nZ0,50,-100\nV5.0\nZ100,50,-100\nV15.0\nZ100,50,200\n!MC0\nH\n";
+    let gcode =
+        "G21 G90\nM3 S9000\nG0 Z5\nG0 X0 Y0\nG1 Z-1 F80\nX9 F400\nG0 Z5\nX0 Y5\nG1 Z-1 F80\nX9\nG0 Z5\nM2\n";
+    let options = Options::default();
+    for text in [rml, gcode] {
+        let old = text.replace('\n', "\r");
+        same(text, &old);
+        assert_eq!(lines_of(text), lines_of(&old));
+        let resumed = |text: &str| {
+            let again = resume::resume(text.as_bytes(), 2, &options).expect("two passes");
+            String::from_utf8(again.text).expect("text")
+        };
+        assert_eq!(resumed(text).replace('\n', "\r"), resumed(&old));
+    }
+    let refusal = |text: &str| {
+        Reading::of(text.as_bytes(), &options).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    assert!(refusal("G21\rG0 Z5\r\rG0 X1 $\r").starts_with("line 4, column 7: "), "a place in G-code");
+    assert!(refusal("^DF\r^PA\rV5\r!QQ1\r").starts_with("line 4, column 1: "), "a place in RML-1");
 }
 
 #[test]

@@ -88,11 +88,15 @@ struct Whole<'a> {
 impl Whole<'_> {
     /// The lines of the text with their endings, and how many stand before a line number.
     fn lines(&self) -> Vec<&[u8]> {
-        self.text.split_inclusive(|byte| *byte == b'\n').collect()
+        verify::lines(self.text)
     }
 
     fn ending(&self) -> &'static [u8] {
-        if self.text.windows(2).any(|pair| pair == b"\r\n") { b"\r\n" } else { b"\n" }
+        match verify::lines(self.text).first() {
+            Some(line) if line.ends_with(b"\r\n") => b"\r\n",
+            Some(line) if line.ends_with(b"\r") => b"\r",
+            _ => b"\n",
+        }
     }
 
     /// Where the cutter stands when the start is over.

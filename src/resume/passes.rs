@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use crate::verify::Reading;
+use crate::verify::{Reading, lines};
 
 /// Heights closer than this are one plane, in mm.
 const SAME_MM: f64 = 1e-6;
@@ -68,7 +68,7 @@ fn plane_mm(reading: &Reading) -> Option<f64> {
 /// Numbers and lines of the comments that mark passes.
 fn marks(text: &[u8]) -> Vec<(u64, u32)> {
     let mut marks = Vec::new();
-    for (index, line) in text.split(|byte| *byte == b'\n').enumerate() {
+    for (index, line) in lines(text).into_iter().enumerate() {
         let line = line.trim_ascii();
         let inner = line.strip_prefix(b"(").and_then(|rest| rest.strip_suffix(b")"));
         let Some(inner) = inner.or(line.strip_prefix(b";")) else { continue };

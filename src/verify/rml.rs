@@ -105,11 +105,13 @@ struct Scanner<'a> {
 
 impl Scanner<'_> {
     fn advance(&mut self) -> Result<(), Error> {
-        if self.next == Some(b'\n') {
+        let last = self.next;
+        self.next = self.source.fill_buf()?.first().copied();
+        // CR alone ends a line too.
+        if last == Some(b'\n') || (last == Some(b'\r') && self.next != Some(b'\n')) {
             self.line += 1;
             self.column = 0;
         }
-        self.next = self.source.fill_buf()?.first().copied();
         if let Some(byte) = self.next {
             self.source.consume(1);
             self.column += 1;

@@ -105,7 +105,7 @@ impl Block {
             let byte = text[i];
             let at = Place { line, column: i as u64 + 1 };
             match byte {
-                b' ' | b'\t' | b'\r' => i += 1,
+                b' ' | b'\t' => i += 1,
                 b'(' => i = self.comment(text, i)?,
                 b';' => {
                     ascii(&text[i..], at)?;
@@ -137,7 +137,7 @@ impl Block {
             match byte {
                 b')' => return Ok(i + 1),
                 b'(' => return Err(Error::CommentNested { at: at(i) }),
-                b'\t' | b'\r' | 0x20..=0x7e => {}
+                b'\t' | 0x20..=0x7e => {}
                 _ => return Err(Error::NotAscii { at: at(i), byte }),
             }
         }
@@ -181,7 +181,7 @@ impl Block {
 }
 
 fn ascii(text: &[u8], from: Place) -> Result<(), Error> {
-    match text.iter().position(|b| !matches!(b, b'\t' | b'\r' | 0x20..=0x7e)) {
+    match text.iter().position(|b| !matches!(b, b'\t' | 0x20..=0x7e)) {
         Some(i) => {
             Err(Error::NotAscii { at: Place { column: from.column + i as u64, ..from }, byte: text[i] })
         }
@@ -225,7 +225,7 @@ fn number(text: &[u8], from: usize, letter: u8, line: u64) -> Result<(f64, usize
                 let at = Place { line, column: i as u64 + 1 };
                 return Err(Error::NumberMalformed { at, letter: letter as char });
             }
-            b' ' | b'\t' | b'\r' => {}
+            b' ' | b'\t' => {}
             _ => break,
         }
         i += 1;

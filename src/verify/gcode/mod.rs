@@ -11,6 +11,7 @@ mod block;
 use std::io::BufRead;
 
 use super::error::{Error, Place};
+use super::line;
 use super::reading::{Event, Language, Motion, Note, PathMode, Summary};
 use arc::Arc;
 use block::{Block, Group};
@@ -53,27 +54,22 @@ pub(super) fn read(source: &mut dyn BufRead, each: &mut Sink) -> Result<Summary,
     let mut summary = Summary { language: Language::GCode, blocks: 0, bytes: 0, notes: Vec::new() };
     let mut text = Vec::with_capacity(256);
     let mut block = Block::new();
-    let (mut line, mut opened, mut ended) = (0u64, false, false);
+    let (mut number, mut opened, mut ended) = (0u64, false, false);
     loop {
-        text.clear();
-        let taken =
-            std::io::Read::take(&mut *source, LONGEST_LINE as u64 + 2).read_until(b'\n', &mut text)?;
+        let taken = line::next(source, &mut text, LONGEST_LINE)?;
         if taken == 0 {
             break;
         }
-        line += 1;
+        number += 1;
         summary.bytes += taken as u64;
-        if text.last() == Some(&b'\n') {
-            text.pop();
-        }
         if text.len() > LONGEST_LINE {
-            return Err(Error::LineTooLong { line, most: LONGEST_LINE });
+            return Err(Error::LineTooLong { line: number, most: LONGEST_LINE });
         }
         if ended {
             // What follows the end is never run.
             continue;
         }
-        block.parse(&text, line)?;
+        block.parse(&text, number)?;
         if block.words > 0 {
             summary.blocks += 1;
             ended = modal.run(&mut block, &mut summary.notes, each)?;
@@ -85,7 +81,7 @@ pub(super) fn read(source: &mut dyn BufRead, each: &mut Sink) -> Result<Summary,
         }
     }
     if !ended {
-        return Err(if line == 0 { Error::Empty } else { Error::NoEnd { line } });
+        return Err(if number == 0 { Error::Empty } else { Error::NoEnd { line: number } });
     }
     Ok(summary)
 }
