@@ -23,15 +23,6 @@ impl Reachable {
         (self.y[1] - self.y[0] + 0.5) * (1.0 + (self.x[1] - self.x[0]) / LANES as f64)
     }
 
-    /// The box around both.
-    #[inline(always)]
-    pub fn hull(&self, other: &Reachable) -> Reachable {
-        Reachable {
-            x: [less(self.x[0], other.x[0]), greater(self.x[1], other.x[1])],
-            y: [less(self.y[0], other.y[0]), greater(self.y[1], other.y[1])],
-        }
-    }
-
     #[inline(always)]
     fn is_empty(&self) -> bool {
         self.x[0] > self.x[1] || self.y[0] > self.y[1]

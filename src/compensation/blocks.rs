@@ -105,6 +105,44 @@ struct Sides<V: Vectors> {
     y_high: V::Group,
 }
 
+impl<V: Vectors> Sides<V> {
+    /// Without what lies between lattice points, if offsets are whole.
+    #[inline(always)]
+    fn rounded(&self, whole: bool) -> Sides<V> {
+        if !whole {
+            return Sides { ..*self };
+        }
+        Sides {
+            x_low: V::ceil(self.x_low),
+            x_high: V::floor(self.x_high),
+            y_low: V::ceil(self.y_low),
+            y_high: V::floor(self.y_high),
+        }
+    }
+
+    /// The lanes in which the box is not empty.
+    #[inline(always)]
+    fn there(&self) -> u16 {
+        V::at_least(self.x_high, self.x_low) & V::at_least(self.y_high, self.y_low)
+    }
+}
+
+/// Boxes to sweep, whatever the slopes.
+#[inline(always)]
+fn steep_start<V: Vectors>(
+    radius: V::Group,
+    start: V::Group,
+    [x_next, x_before, y_next, y_before]: [V::Group; 4],
+) -> Sides<V> {
+    let zero = V::splat(0.0);
+    let low = |next| {
+        let low = V::subtract(V::less(V::multiply(next, radius), zero), start);
+        V::greater(low, V::subtract(zero, radius))
+    };
+    let high = |before| V::less(V::add(V::greater(V::multiply(before, radius), zero), start), radius);
+    Sides { x_low: low(x_next), x_high: high(x_before), y_low: low(y_next), y_high: high(y_before) }
+}
+
 /// What sweeps take of a ball.
 struct Sweeper<V: Vectors> {
     half: V::Group,
@@ -232,7 +270,6 @@ pub(super) struct Moderate {
     radius: f32,
     /// Half a sample, and room for rounding.
     half: f32,
-    per_step: f32,
     /// How often boxes are tightened; the spread of small balls is wide.
     sweeps: usize,
 }
@@ -259,13 +296,256 @@ impl Moderate {
             spread: spread as f32,
             radius: radius as f32,
             half: (0.5 + ball.room()) as f32,
-            per_step: (1.0 / ball.step_mm) as f32,
             sweeps: if radius < 60.0 { 2 } else { 1 },
         })
     }
+
+    /// Boxes to sweep.
+    #[inline(always)]
+    fn start<V: Vectors>(
+        &self,
+        x_next: V::Group,
+        x_before: V::Group,
+        y_next: V::Group,
+        y_before: V::Group,
+    ) -> Sides<V> {
+        let spread = V::splat(self.spread);
+        let one = V::splat(1.0);
+        let half = V::splat(self.half);
+        let x_near = nearest::<V>(V::subtract(x_next, spread), V::add(x_before, spread));
+        let y_near = nearest::<V>(V::subtract(y_next, spread), V::add(y_before, spread));
+        let x_far = farthest::<V>(V::subtract(x_next, spread), V::add(x_before, spread));
+        let y_far = farthest::<V>(V::subtract(y_next, spread), V::add(y_before, spread));
+        let q_most = V::add(squares::<V>(x_far, y_far), one);
+        let q_least = V::add(squares::<V>(x_near, y_near), one);
+        let z_low = V::multiply(V::splat(self.radius * (1.0 - V::INVERSE_ERROR)), V::inverse_root(q_most));
+        let z_high = V::multiply(V::splat(self.radius * (1.0 + V::INVERSE_ERROR)), V::inverse_root(q_least));
+        Sides {
+            x_low: V::subtract(low::<V>(x_next, z_low, z_high), half),
+            x_high: V::add(high::<V>(x_before, z_low, z_high), half),
+            y_low: V::subtract(low::<V>(y_next, z_low, z_high), half),
+            y_high: V::add(high::<V>(y_before, z_low, z_high), half),
+        }
+    }
 }
 
-/// The boxes of a block's samples, lane by lane: offsets at which each can touch.
+/// The rises of samples, lane by lane, in samples per sample: rows of a block, or samples put
+/// together from them.
+pub(super) struct Lanes {
+    pub x_next: [[f32; LANES]; ROWS],
+    pub x_before: [[f32; LANES]; ROWS],
+    pub y_next: [[f32; LANES]; ROWS],
+    pub y_before: [[f32; LANES]; ROWS],
+    /// Samples that are there.
+    pub data: [u16; ROWS],
+}
+
+impl Lanes {
+    pub fn new() -> Lanes {
+        let none = [[0.0; LANES]; ROWS];
+        Lanes { x_next: none, x_before: none, y_next: none, y_before: none, data: [0; ROWS] }
+    }
+
+    /// Becomes those of a block, in mm.
+    #[inline(always)]
+    pub fn fill<V: Vectors>(&mut self, field: &Field, block: Block) {
+        let i = PAD + block.first;
+        let mut z = V::load(group(field.row(block.a), i));
+        let mut from_below = V::subtract(z, V::load(group(field.row(block.a - 1), i)));
+        self.data = [0; ROWS];
+        for r in 0..block.rows {
+            let row = field.row(block.a + r as i64);
+            let above = V::load(group(field.row(block.a + r as i64 + 1), i));
+            let to_above = V::subtract(above, z);
+            V::store(V::subtract(V::load(group(row, i + 1)), z), &mut self.x_next[r]);
+            V::store(V::subtract(z, V::load(group(row, i - 1))), &mut self.x_before[r]);
+            V::store(to_above, &mut self.y_next[r]);
+            V::store(from_below, &mut self.y_before[r]);
+            self.data[r] = V::at_least(z, V::splat(LEAST));
+            z = above;
+            from_below = to_above;
+        }
+    }
+
+    /// The samples among `of` whose rises are held by these.
+    #[inline(always)]
+    pub fn held<V: Vectors>(&self, of: &[u16; ROWS], by: &Rises) -> [u16; ROWS] {
+        let (x_next, x_before) = (V::splat(by.x_next), V::splat(by.x_before));
+        let (y_next, y_before) = (V::splat(by.y_next), V::splat(by.y_before));
+        let mut held = [0; ROWS];
+        for r in 0..ROWS {
+            if of[r] != 0 {
+                held[r] = of[r]
+                    & V::at_least(V::load(&self.x_next[r]), x_next)
+                    & V::at_least(x_before, V::load(&self.x_before[r]))
+                    & V::at_least(V::load(&self.y_next[r]), y_next)
+                    & V::at_least(y_before, V::load(&self.y_before[r]));
+            }
+        }
+        held
+    }
+
+    /// The samples among `of` which are on a plane, or in a valley, as far as their neighbours tell.
+    #[inline(always)]
+    pub fn level<V: Vectors>(&self, of: &[u16; ROWS], within_mm: f32) -> [u16; ROWS] {
+        let within = V::splat(within_mm);
+        let mut level = [0; ROWS];
+        for r in 0..ROWS {
+            if of[r] != 0 {
+                let x = V::subtract(V::load(&self.x_before[r]), V::load(&self.x_next[r]));
+                let y = V::subtract(V::load(&self.y_before[r]), V::load(&self.y_next[r]));
+                level[r] = of[r] & V::at_least(within, V::greater(x, y));
+            }
+        }
+        level
+    }
+
+    /// Those of one sample.
+    #[inline(always)]
+    pub fn at(&self, r: usize, lane: usize) -> Rises {
+        Rises {
+            x_next: self.x_next[r][lane],
+            x_before: self.x_before[r][lane],
+            y_next: self.y_next[r][lane],
+            y_before: self.y_before[r][lane],
+        }
+    }
+
+    /// Puts the samples `bits` of `of` together, in order, and tells where each comes from: row
+    /// and lane.
+    #[inline(always)]
+    pub fn pack(&mut self, of: &Lanes, bits: &[u16; ROWS], from: &mut [[u8; 2]; ROWS * LANES]) {
+        let mut count = 0;
+        for (r, &bits) in bits.iter().enumerate() {
+            let mut bits = bits;
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let (row, to) = (count / LANES, count % LANES);
+                self.x_next[row][to] = of.x_next[r][lane];
+                self.x_before[row][to] = of.x_before[r][lane];
+                self.y_next[row][to] = of.y_next[r][lane];
+                self.y_before[row][to] = of.y_before[r][lane];
+                from[count] = [r as u8, lane as u8];
+                count += 1;
+            }
+        }
+        for (row, data) in self.data.iter_mut().enumerate() {
+            let lanes = count.saturating_sub(row * LANES).min(LANES);
+            *data = ((1u32 << lanes) - 1) as u16;
+        }
+    }
+}
+
+/// The offsets along x at which one sample can touch in each row of its box, in the order of the
+/// target rows.
+pub(super) struct RowBounds {
+    pub low: Vec<[f32; LANES]>,
+    pub high: Vec<[f32; LANES]>,
+}
+
+impl RowBounds {
+    pub fn new() -> RowBounds {
+        RowBounds { low: Vec::new(), high: Vec::new() }
+    }
+
+    /// Of the `count` rows at `dy`, `dy - every`, ...; gives about how many groups of lanes they
+    /// take. An edge that drops off to one side leaves a box as large as the ball, of which an
+    /// arc is possible: in x by the slopes along x, and at each dy only where the ball falls along
+    /// y as the surface does.
+    #[inline(always)]
+    pub fn fill<V: Vectors>(
+        &mut self,
+        rises: &Rises,
+        ball: &Ball,
+        at: &Reachable,
+        [dy, every, count]: [i32; 3],
+    ) -> usize {
+        let sweeper = Sweeper::<V>::new(ball);
+        let zero = V::splat(0.0);
+        let scale = (1.0 / ball.step_mm) as f32;
+        let slope = |rise: f32| Slope::<V>::new(V::splat(rise * scale));
+        let (x_next, x_before) = (slope(rises.x_next), slope(0.0 - rises.x_before));
+        // Along y as if rising, from where each bounds.
+        let rising = [rises.y_next * scale, 0.0 - rises.y_before * scale];
+        let mut steps = [0.0; LANES];
+        for (k, step) in steps.iter_mut().enumerate() {
+            *step = (k as i32 * every) as f32;
+        }
+        let steps = V::load(&steps);
+        let (x_low, x_high) = (V::splat(at.x[0] as f32), V::splat(at.x[1] as f32));
+        let mut groups = 0;
+        self.low.clear();
+        self.high.clear();
+        for first in (0..count).step_by(LANES) {
+            let y = V::subtract(V::splat((dy - first * every) as f32), steps);
+            let (low, high, cap) = circle::<V>(y, y, &sweeper);
+            let mut lo = V::greater(x_low, x_next.bound(low, high, cap, sweeper.half));
+            let mut hi = V::less(x_high, V::subtract(zero, x_before.bound(low, high, cap, sweeper.half)));
+            for (k, g) in rising.into_iter().enumerate() {
+                // The chord to the neighbour ahead is level with y + 1/2 >= sin sqrt(C^2 - quarter).
+                let ahead = if k == 0 { y } else { V::subtract(zero, y) };
+                let ahead = V::add(ahead, sweeper.half);
+                let Some([near, far]) = at_slope::<V>(g, ahead, &sweeper) else { continue };
+                // What lies nearer the axis than `near` or farther from it than `far` is out.
+                hi = V::less(hi, far);
+                lo = V::greater(lo, V::subtract(zero, far));
+                if at.x[0] >= 0.0 {
+                    lo = V::greater(lo, near);
+                } else if at.x[1] <= 0.0 {
+                    hi = V::less(hi, V::subtract(zero, near));
+                }
+            }
+            let (lo, hi) = (V::ceil(lo), V::floor(hi));
+            let (mut lows, mut highs) = ([0.0; LANES], [0.0; LANES]);
+            V::store(lo, &mut lows);
+            V::store(hi, &mut highs);
+            for (low, high) in lows.iter().zip(&highs).take((count - first) as usize) {
+                if low <= high {
+                    groups += 1 + (high - low) as usize / LANES;
+                }
+            }
+            self.low.push(lows);
+            self.high.push(highs);
+        }
+        groups
+    }
+}
+
+/// How near the axis and how far from it a sample can be that stands `ahead` - 1/2 from it along
+/// the other axis, and whose neighbour there rises by the slope `g`, or falls. None where this
+/// tells nothing.
+#[inline(always)]
+fn at_slope<V: Vectors>(g: f32, ahead: V::Group, of: &Sweeper<V>) -> Option<[V::Group; 2]> {
+    // Steeper slopes may have their neighbour outside the ball.
+    if !(0.02..2.0).contains(&g.abs()) {
+        return None;
+    }
+    let quarter = 0.25 * (1.0 + g * g);
+    // 1 / sin^2, on the safe side.
+    let cosecant = 1.0 + 1.0 / (g * g);
+    let zero = V::splat(0.0);
+    let square = V::multiply(ahead, ahead);
+    if g > 0.0 {
+        // C^2 <= (ahead / sin)^2 + quarter, where ahead is positive, and never else.
+        let most = V::add(V::multiply(square, V::splat(cosecant * 1.00001)), V::splat(quarter * 1.00001));
+        let near = V::greater(V::subtract(of.square_less, most), zero);
+        let near = V::multiply(root::<V>(near), V::splat(1.0 - V::INVERSE_ERROR));
+        let none = V::at_least(zero, ahead);
+        Some([V::choose(none, V::splat(1e9), V::subtract(near, V::splat(1e-3))), V::splat(1e9)])
+    } else {
+        // C^2 >= (ahead / sin)^2 where ahead is negative; a quarter more but for the last samples.
+        let least = V::multiply(square, V::splat(cosecant * 0.99999));
+        let far = V::subtract(of.square_more, least);
+        let none = V::at_least(zero, far);
+        let far = V::multiply(root::<V>(far), V::splat(1.0 + V::INVERSE_ERROR));
+        let far = V::choose(none, V::splat(-1.0), V::add(far, V::splat(1e-3)));
+        let falls = V::at_least(zero, ahead);
+        Some([zero, V::choose(falls, far, V::splat(1e9))])
+    }
+}
+
+/// The boxes of samples, lane by lane: offsets at which each can touch.
 pub(super) struct Boxes<V: Vectors> {
     pub x_low: [[f32; LANES]; ROWS],
     pub x_high: [[f32; LANES]; ROWS],
@@ -273,10 +553,8 @@ pub(super) struct Boxes<V: Vectors> {
     pub y_high: [[f32; LANES]; ROWS],
     /// Samples with a box.
     pub boxed: [u16; ROWS],
-    /// Samples that are too steep to have one here.
-    pub steep: [u16; ROWS],
-    /// Of all rows.
-    pub any_steep: u16,
+    /// Rows whose samples are bounded one by one, counted since it was last asked.
+    pub bounded: usize,
     vectors: PhantomData<V>,
 }
 
@@ -289,135 +567,74 @@ impl<V: Vectors> Boxes<V> {
             y_low: none,
             y_high: none,
             boxed: [0; ROWS],
-            steep: [0; ROWS],
-            any_steep: 0,
+            bounded: 0,
             vectors: PhantomData,
         }
     }
 
-    /// Fills in the block's; `whole` rounds boxes to the lattice inwards.
+    /// Those of the samples `of` these lanes; `whole` rounds boxes to the lattice inwards.
     #[inline(always)]
-    pub fn fill(&mut self, field: &Field, block: Block, ball: &Ball, of: &Moderate, whole: bool) {
-        let i = PAD + block.first;
-        self.any_steep = 0;
-        let scale = V::splat(of.per_step);
-        let steepest = V::splat(of.steepest);
-        let spread = V::splat(of.spread);
-        let one = V::splat(1.0);
-        let half = V::splat(of.half);
+    pub fn fill(
+        &mut self,
+        lanes: &Lanes,
+        of: &[u16; ROWS],
+        ball: &Ball,
+        moderate: &Option<Moderate>,
+        whole: bool,
+    ) {
+        let scale = V::splat((1.0 / ball.step_mm) as f32);
         let sweeper = Sweeper::<V>::new(ball);
-        let lower = V::splat(of.radius * (1.0 - V::INVERSE_ERROR));
-        let upper = V::splat(of.radius * (1.0 + V::INVERSE_ERROR));
-        let mut z = V::load(group(field.row(block.a), i));
-        let mut from_below = V::subtract(z, V::load(group(field.row(block.a - 1), i)));
-        for r in 0..block.rows {
-            let row = field.row(block.a + r as i64);
-            let above = V::load(group(field.row(block.a + r as i64 + 1), i));
-            let to_above = V::subtract(above, z);
-            let x_next = V::multiply(V::subtract(V::load(group(row, i + 1)), z), scale);
-            let x_before = V::multiply(V::subtract(z, V::load(group(row, i - 1))), scale);
-            let y_next = V::multiply(to_above, scale);
-            let y_before = V::multiply(from_below, scale);
-            let data = V::at_least(z, V::splat(LEAST));
-            z = above;
-            from_below = to_above;
+        // Nothing is steeper than what moderate slopes are, without any.
+        let steepest = V::splat(moderate.as_ref().map_or(-1.0, |moderate| moderate.steepest));
+        for r in 0..ROWS {
+            self.boxed[r] = 0;
+            if of[r] == 0 {
+                continue;
+            }
+            self.bounded += 1;
+            let x_next = V::multiply(V::load(&lanes.x_next[r]), scale);
+            let x_before = V::multiply(V::load(&lanes.x_before[r]), scale);
+            let y_next = V::multiply(V::load(&lanes.y_next[r]), scale);
+            let y_before = V::multiply(V::load(&lanes.y_before[r]), scale);
             let x_size = V::greater(size::<V>(x_next), size::<V>(x_before));
             let y_size = V::greater(size::<V>(y_next), size::<V>(y_before));
-            let moderate = V::at_least(steepest, V::greater(x_size, y_size));
-            self.steep[r] = data & !moderate;
-            self.any_steep |= self.steep[r];
-            if data & moderate == 0 {
-                self.boxed[r] = 0;
-                continue;
+            let of_moderate = of[r] & V::at_least(steepest, V::greater(x_size, y_size));
+            let steep = of[r] & !of_moderate;
+            if let Some(moderate) = moderate
+                && of_moderate != 0
+            {
+                let mut at = moderate.start::<V>(x_next, x_before, y_next, y_before);
+                let around = at.rounded(whole);
+                if of_moderate & around.there() != 0 {
+                    let slopes = Slopes::<V>::new(x_next, x_before, y_next, y_before);
+                    for _ in 0..moderate.sweeps {
+                        slopes.sweep(&mut at, &sweeper);
+                    }
+                    self.put(r, of_moderate, &at.rounded(whole));
+                }
             }
-            let x_near = nearest::<V>(V::subtract(x_next, spread), V::add(x_before, spread));
-            let y_near = nearest::<V>(V::subtract(y_next, spread), V::add(y_before, spread));
-            let x_far = farthest::<V>(V::subtract(x_next, spread), V::add(x_before, spread));
-            let y_far = farthest::<V>(V::subtract(y_next, spread), V::add(y_before, spread));
-            let q_most = V::add(squares::<V>(x_far, y_far), one);
-            let q_least = V::add(squares::<V>(x_near, y_near), one);
-            let z_low = V::multiply(lower, V::inverse_root(q_most));
-            let z_high = V::multiply(upper, V::inverse_root(q_least));
-            let mut at = Sides::<V> {
-                x_low: V::subtract(low::<V>(x_next, z_low, z_high), half),
-                x_high: V::add(high::<V>(x_before, z_low, z_high), half),
-                y_low: V::subtract(low::<V>(y_next, z_low, z_high), half),
-                y_high: V::add(high::<V>(y_before, z_low, z_high), half),
-            };
-            let slopes = Slopes::<V>::new(x_next, x_before, y_next, y_before);
-            for _ in 0..of.sweeps {
-                slopes.sweep(&mut at, &sweeper);
+            if steep != 0 {
+                self.bounded += 1;
+                let radius = V::splat(ball.radius as f32);
+                let start = V::splat((1.0 + ball.room()) as f32);
+                let mut at = steep_start::<V>(radius, start, [x_next, x_before, y_next, y_before]);
+                let slopes = Slopes::<V>::new(x_next, x_before, y_next, y_before);
+                for _ in 0..4 {
+                    slopes.sweep(&mut at, &sweeper);
+                }
+                self.put(r, steep, &at.rounded(whole));
             }
-            let Sides { mut x_low, mut x_high, mut y_low, mut y_high } = at;
-            if whole {
-                (x_low, x_high) = (V::ceil(x_low), V::floor(x_high));
-                (y_low, y_high) = (V::ceil(y_low), V::floor(y_high));
-            }
-            self.boxed[r] = data & moderate & V::at_least(x_high, x_low) & V::at_least(y_high, y_low);
-            V::store(x_low, &mut self.x_low[r]);
-            V::store(x_high, &mut self.x_high[r]);
-            V::store(y_low, &mut self.y_low[r]);
-            V::store(y_high, &mut self.y_high[r]);
         }
     }
 
-    /// Takes all samples with data for too steep.
+    /// Takes the boxes of some samples of a row.
     #[inline(always)]
-    pub fn all_steep(&mut self, field: &Field, block: Block) {
-        for r in 0..block.rows {
-            let row = field.row(block.a + r as i64);
-            self.steep[r] = V::at_least(V::load(group(row, PAD + block.first)), V::splat(LEAST));
-            self.boxed[r] = 0;
-        }
-        self.any_steep = u16::MAX;
-    }
-
-    /// Boxes of the samples that are too steep, by the sweeps of [`Ball::reachable`], lane by lane.
-    #[inline(always)]
-    pub fn fill_steep(&mut self, field: &Field, block: Block, ball: &Ball, whole: bool) {
-        let i = PAD + block.first;
-        let scale = V::splat((1.0 / ball.step_mm) as f32);
-        let zero = V::splat(0.0);
-        let radius = V::splat(ball.radius as f32);
-        let start = V::splat((1.0 + ball.room()) as f32);
-        let sweeper = Sweeper::<V>::new(ball);
-        for r in 0..block.rows {
-            if self.steep[r] == 0 {
-                continue;
-            }
-            let row = field.row(block.a + r as i64);
-            let z = V::load(group(row, i));
-            let x_next = V::multiply(V::subtract(V::load(group(row, i + 1)), z), scale);
-            let x_before = V::multiply(V::subtract(z, V::load(group(row, i - 1))), scale);
-            let above = V::load(group(field.row(block.a + r as i64 + 1), i));
-            let below = V::load(group(field.row(block.a + r as i64 - 1), i));
-            let y_next = V::multiply(V::subtract(above, z), scale);
-            let y_before = V::multiply(V::subtract(z, below), scale);
-            let low = V::subtract(V::less(V::multiply(x_next, radius), zero), start);
-            let x_low = V::greater(low, V::subtract(zero, radius));
-            let high = V::add(V::greater(V::multiply(x_before, radius), zero), start);
-            let x_high = V::less(high, radius);
-            let low = V::subtract(V::less(V::multiply(y_next, radius), zero), start);
-            let y_low = V::greater(low, V::subtract(zero, radius));
-            let high = V::add(V::greater(V::multiply(y_before, radius), zero), start);
-            let y_high = V::less(high, radius);
-            let mut at = Sides::<V> { x_low, x_high, y_low, y_high };
-            let slopes = Slopes::<V>::new(x_next, x_before, y_next, y_before);
-            for _ in 0..4 {
-                slopes.sweep(&mut at, &sweeper);
-            }
-            let Sides { mut x_low, mut x_high, mut y_low, mut y_high } = at;
-            if whole {
-                (x_low, x_high) = (V::ceil(x_low), V::floor(x_high));
-                (y_low, y_high) = (V::ceil(y_low), V::floor(y_high));
-            }
-            let bits = self.steep[r];
-            self.boxed[r] |= bits & V::at_least(x_high, x_low) & V::at_least(y_high, y_low);
-            V::store(V::choose(bits, x_low, V::load(&self.x_low[r])), &mut self.x_low[r]);
-            V::store(V::choose(bits, x_high, V::load(&self.x_high[r])), &mut self.x_high[r]);
-            V::store(V::choose(bits, y_low, V::load(&self.y_low[r])), &mut self.y_low[r]);
-            V::store(V::choose(bits, y_high, V::load(&self.y_high[r])), &mut self.y_high[r]);
-        }
+    fn put(&mut self, r: usize, bits: u16, at: &Sides<V>) {
+        self.boxed[r] |= bits & at.there();
+        V::store(V::choose(bits, at.x_low, V::load(&self.x_low[r])), &mut self.x_low[r]);
+        V::store(V::choose(bits, at.x_high, V::load(&self.x_high[r])), &mut self.x_high[r]);
+        V::store(V::choose(bits, at.y_low, V::load(&self.y_low[r])), &mut self.y_low[r]);
+        V::store(V::choose(bits, at.y_high, V::load(&self.y_high[r])), &mut self.y_high[r]);
     }
 
     /// The box of one sample.

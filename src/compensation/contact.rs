@@ -14,20 +14,20 @@
 
 use super::Profile;
 use super::ball::{Ball, Reachable};
-use super::blocks::{Block, Boxes, Moderate, ROWS, measure};
+use super::blocks::{Block, Boxes, Lanes, Moderate, ROWS, RowBounds, measure};
 use super::field::{Field, PAD, Targets};
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors, widest};
 use super::pairs::Pairs;
-use super::runs::{Run, raise_run, row_work};
+use super::runs::{BoxRows, Offsets, Run, Span, raise_run, raise_sample, raise_spans, row_work};
 use super::slopes::Rises;
 use super::unboxed;
 
 /// What raising targets by blocks of one box costs besides, in groups of lanes.
 const BLOCK_WORK: usize = 60;
 
-/// What bounding the samples of a block costs, and once more if some are steep.
-const SPLIT_WORK: usize = 600;
+/// What bounding a row of samples one by one costs.
+const ROW_WORK: usize = 75;
 
 /// What looking at far neighbours costs.
 const FAR_WORK: usize = 900;
@@ -38,8 +38,14 @@ pub(super) const WIDE: f64 = 100.0;
 /// Lattice points of a block's box, at most, for it to be used for all its samples.
 const FEW: f64 = 9.0;
 
-/// Samples of a block that share a box, at least, for it to be used for all of them.
-const MANY: u32 = 20;
+/// Samples of a block that share a box, at least, for it to be looked for.
+const MANY: u32 = 12;
+
+/// Samples of a block on a facet that is known already, at least, to be taken at once.
+const SOME: u32 = 2;
+
+/// Samples of a block from which boxes are shared by any that have nearly the same.
+const MOST: u32 = 40;
 
 /// Rows of a box from which each is narrowed by itself.
 const TALL: f64 = 3.0;
@@ -69,11 +75,15 @@ pub(super) fn body<V: Vectors, P: Pairs>(
         pairs,
         ball,
         moderate: Moderate::new(&ball),
+        lanes: Lanes::new(),
+        packed: Lanes::new(),
+        from: [[0; 2]; ROWS * LANES],
         boxes: Boxes::new(),
+        row_bounds: RowBounds::new(),
         whole: pairs.is_whole(),
         alike_mm: (0.4 * ball.step_mm / ball.radius) as f32,
         work: 0,
-        known: vec![Known::default(); field.columns.div_ceil(LANES)],
+        known: vec![[Known::default(); 2]; field.columns.div_ceil(LANES) + 1],
     };
     for a in (0..field.rows).step_by(ROWS) {
         let part = a as f64 / field.rows as f64;
@@ -110,15 +120,20 @@ struct Search<'a, V: Vectors, P: Pairs> {
     pairs: &'a P,
     ball: Ball,
     moderate: Option<Moderate>,
+    lanes: Lanes,
+    packed: Lanes,
+    /// Where the packed samples come from: row and lane.
+    from: [[u8; 2]; ROWS * LANES],
     boxes: Boxes<V>,
+    row_bounds: RowBounds,
     /// Whether all offsets are whole samples.
     whole: bool,
     /// Rises that differ by less move a contact by less than a sample.
     alike_mm: f32,
     /// Done so far, in groups of lanes.
     work: usize,
-    /// By column of blocks, from the rows before.
-    known: Vec<Known>,
+    /// By column of blocks, from the rows before: the facets of most samples.
+    known: Vec<[Known; 2]>,
 }
 
 impl<V: Vectors, P: Pairs> Search<'_, V, P> {
@@ -126,7 +141,7 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
     #[inline(always)]
     fn rows(&mut self, a: i64, rows: usize, out: &mut Targets) {
         let mut level = Level { first: 0, len: 0, known: Known::default() };
-        for column in 0..self.known.len() {
+        for column in 0..self.known.len() - 1 {
             let block = Block { a, first: column * LANES, rows };
             let Some(all) = measure::<V>(self.field, block) else {
                 self.raise_level(a, rows, &mut level, out);
@@ -134,18 +149,24 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
             };
             if level.len > 0 && level.known.rises.holds(&all) {
                 level.len += LANES;
+                self.known[column][0] = level.known;
                 continue;
             }
-            let known = self.known[column];
-            let known = if known.rises.holds(&all) { Some(known) } else { self.one_box(&all) };
+            let [one, other] = self.known[column];
+            let known = if one.rises.holds(&all) {
+                Some(one)
+            } else if other.rises.holds(&all) {
+                Some(other)
+            } else {
+                self.one_box(&all)
+            };
+            self.raise_level(a, rows, &mut level, out);
             match known {
                 Some(known) => {
-                    self.known[column] = known;
-                    self.raise_level(a, rows, &mut level, out);
+                    self.known[column][0] = known;
                     level = Level { first: block.first, len: LANES, known };
                 }
                 None => {
-                    self.raise_level(a, rows, &mut level, out);
                     if self.in_reach(block, &all) {
                         self.split(block, out);
                     }
@@ -161,7 +182,7 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
         if all.spread() > 4.0 * self.alike_mm {
             return None;
         }
-        let rises = all.wider(0.25 * self.alike_mm);
+        let rises = all.wider(0.12 * self.alike_mm);
         match self.ball.reachable(&rises) {
             None => Some(Known { rises, at: Reachable { x: [1.0, 0.0], y: [1.0, 0.0] } }),
             Some(at) if at.lattice_points() <= FEW => Some(Known { rises, at }),
@@ -181,28 +202,148 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
     #[inline(always)]
     fn raise_level(&mut self, a: i64, rows: usize, level: &mut Level, out: &mut Targets) {
         if level.len > 0 {
-            let at = level.known.at;
-            self.work += BLOCK_WORK;
-            for r in 0..rows as i64 {
-                let run = Run { a: a + r, first: level.first, len: level.len };
-                raise_run::<V, P>(self.field, self.pairs, run, &at, out, None);
-            }
+            let spans = [[level.first, level.len]; ROWS];
+            self.raise(a, &spans[..rows], &level.known.at, out);
             level.len = 0;
         }
     }
 
-    /// A block whose samples have boxes of their own.
+    /// Raises the targets by some samples of one box.
+    #[inline(always)]
+    fn raise(&mut self, a: i64, spans: &[Span], at: &Reachable, out: &mut Targets) {
+        self.work += BLOCK_WORK;
+        if let Some(on) = self.pairs.on_samples() {
+            raise_spans::<V>(self.field, on, a, spans, &Offsets::of(at), out);
+            return;
+        }
+        for (r, &[first, len]) in spans.iter().enumerate() {
+            if len > 0 {
+                let run = Run { a: a + r as i64, first, len };
+                raise_run::<V, P>(self.field, self.pairs, run, at, out, None);
+            }
+        }
+    }
+
+    /// Raises the targets by some samples of a block, which share a box.
+    #[inline(always)]
+    fn raise_some(&mut self, block: Block, bits: &[u16; ROWS], at: &Reachable, out: &mut Targets) {
+        let spans = bits.map(|bits| {
+            let first = bits.trailing_zeros() as usize;
+            let end = LANES - bits.leading_zeros() as usize;
+            [block.first + first, end.saturating_sub(first)]
+        });
+        self.raise(block.a, &spans[..block.rows], at, out);
+    }
+
+    /// A block with more than one box.
     #[inline(always)]
     fn split(&mut self, block: Block, out: &mut Targets) {
-        self.work += SPLIT_WORK;
-        match &self.moderate {
-            Some(moderate) => self.boxes.fill(self.field, block, &self.ball, moderate, self.whole),
-            None => self.boxes.all_steep(self.field, block),
+        self.work += ROW_WORK;
+        self.lanes.fill::<V>(self.field, block);
+        let mut left = self.lanes.data;
+        self.facets(block, &mut left, out);
+        let count_left = count(&left);
+        if count_left > MOST {
+            self.boxes.bounded = 0;
+            self.boxes.fill(&self.lanes, &left, &self.ball, &self.moderate, self.whole);
+            self.work += self.boxes.bounded * ROW_WORK;
+            self.shared(block, out);
+            for r in 0..block.rows {
+                let mut bits = self.boxes.boxed[r];
+                while bits != 0 {
+                    let lane = bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    self.single(block, [r, lane], [r, lane], out);
+                }
+            }
+        } else if count_left > 0 {
+            self.packed.pack(&self.lanes, &left, &mut self.from);
+            self.boxes.bounded = 0;
+            let of = self.packed.data;
+            self.boxes.fill(&self.packed, &of, &self.ball, &self.moderate, self.whole);
+            self.work += self.boxes.bounded * ROW_WORK;
+            for r in 0..(count_left as usize).div_ceil(LANES) {
+                let mut bits = self.boxes.boxed[r];
+                while bits != 0 {
+                    let lane = bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    let [row, of_row] = self.from[r * LANES + lane];
+                    self.single(block, [row as usize, of_row as usize], [r, lane], out);
+                }
+            }
         }
-        if self.boxes.any_steep != 0 {
-            self.work += SPLIT_WORK;
-            self.boxes.fill_steep(self.field, block, &self.ball, self.whole);
+    }
+
+    /// Takes the samples of a block that lie on facets: on those of the blocks before it and of
+    /// those below, and on others that show themselves.
+    #[inline(always)]
+    fn facets(&mut self, block: Block, left: &mut [u16; ROWS], out: &mut Targets) {
+        let column = block.first / LANES;
+        let before = self.known[column.saturating_sub(1)];
+        let after = self.known[column + 1];
+        let [one, other] = self.known[column];
+        let candidates = [before[0], one, other, before[1], after[0]];
+        let mut kept = [Known::default(); 2];
+        let mut most = [0; 2];
+        let mut keep = |known: Known, count: u32| {
+            if count > most[0] {
+                (kept[1], most[1]) = (kept[0], most[0]);
+                (kept[0], most[0]) = (known, count);
+            } else if count > most[1] {
+                (kept[1], most[1]) = (known, count);
+            }
+        };
+        for (k, known) in candidates.iter().enumerate() {
+            if candidates[..k].iter().any(|other| other.rises.x_next == known.rises.x_next) {
+                continue;
+            }
+            let held = self.lanes.held::<V>(left, &known.rises);
+            let count = count(&held);
+            if count >= SOME {
+                keep(*known, count);
+                for (left, held) in left.iter_mut().zip(&held) {
+                    *left &= !held;
+                }
+                self.raise_some(block, &held, &known.at, out);
+            }
         }
+        for _ in 0..3 {
+            let level = self.lanes.level::<V>(left, 0.1 * self.alike_mm);
+            if count(&level) < MANY {
+                break;
+            }
+            let (r, bits) = level.iter().enumerate().fold((0, 0), |most: (usize, u16), (r, &bits)| {
+                if bits.count_ones() > most.1.count_ones() { (r, bits) } else { most }
+            });
+            // The middle one of them.
+            let mut bits = bits;
+            for _ in 0..bits.count_ones() / 2 {
+                bits &= bits - 1;
+            }
+            let seed = self.lanes.at(r, bits.trailing_zeros() as usize);
+            let Some(known) = self.one_box(&seed) else { break };
+            let held = self.lanes.held::<V>(left, &known.rises);
+            let count = count(&held);
+            for (left, held) in left.iter_mut().zip(&held) {
+                *left &= !held;
+            }
+            self.raise_some(block, &held, &known.at, out);
+            if count < MANY {
+                break;
+            }
+            keep(known, count);
+        }
+        if most[0] > 0 {
+            self.known[column][0] = kept[0];
+        }
+        if most[1] > 0 {
+            self.known[column][1] = kept[1];
+        }
+    }
+
+    /// Takes samples whose boxes are small and nearly the same.
+    #[inline(always)]
+    fn shared(&mut self, block: Block, out: &mut Targets) {
         let mut small = self.boxes.small(block.rows, if self.whole { 1.0 } else { 1.6 });
         let mut tries = 4;
         while tries > 0 && count(&small) >= MANY {
@@ -222,73 +363,63 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
             }
             let hull = self.boxes.hull(&these);
             for (r, these) in these.iter().enumerate() {
-                if *these != 0 {
-                    small[r] &= !these;
-                    self.boxes.boxed[r] &= !these;
-                    let first = block.first + these.trailing_zeros() as usize;
-                    let len = block.first + LANES - these.leading_zeros() as usize - first;
-                    let run = Run { a: block.a + r as i64, first, len };
-                    raise_run::<V, P>(self.field, self.pairs, run, &hull, out, None);
-                }
+                small[r] &= !these;
+                self.boxes.boxed[r] &= !these;
             }
-        }
-        for r in 0..block.rows {
-            if self.boxes.boxed[r] != 0 {
-                self.singles(block, r, out);
-            }
+            self.raise_some(block, &these, &hull, out);
         }
     }
 
-    /// The samples of a row of a block that are left, in runs of nearly one box.
+    /// Takes one sample of a block, whose box stands `at`.
     #[inline(always)]
-    fn singles(&mut self, block: Block, r: usize, out: &mut Targets) {
+    fn single(&mut self, block: Block, [r, lane]: [usize; 2], at: [usize; 2], out: &mut Targets) {
         let a = block.a + r as i64;
-        let mut bits = self.boxes.boxed[r];
-        let mut open: Option<Group> = None;
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize;
-            bits &= bits - 1;
-            let first = block.first + lane;
-            let rises = Rises::of(self.field, a, PAD + first, true);
-            let mut at = Some(self.boxes.at(r, lane));
-            if let Some(wide) = at
-                && wide.x[1] - wide.x[0] > 4.0
-                && wide.groups() > WIDE
-            {
-                self.work += FAR_WORK;
-                at = self.ball.far_neighbours(self.field, a, PAD + first, wide);
+        let first = block.first + lane;
+        let mut at = self.boxes.at(at[0], at[1]);
+        let wide = at.x[1] - at.x[0];
+        if let Some(on) = self.pairs.on_samples() {
+            let mut offsets = Offsets::of(&at);
+            let mut rows = BoxRows::of(on, a, &offsets);
+            if rows.count == 0 {
+                return;
             }
-            let Some(at) = at else { continue };
-            let one = Group::new(first, rises, at);
-            open = match open {
-                None => Some(one),
-                Some(group) => {
-                    let both = group.with(&one);
-                    if both.work <= group.work + one.work {
-                        Some(both)
-                    } else {
-                        self.raise_group(a, &group, out);
-                        Some(one)
+            let mut narrow = None;
+            if wide >= LANES as f64 && rows.count > 2 {
+                let rises = self.lanes.at(r, lane);
+                let every = on.every as i32;
+                let of_rows = |rows: BoxRows| [rows.dy, every, rows.count as i32];
+                let mut groups = self.row_bounds.fill::<V>(&rises, &self.ball, &at, of_rows(rows));
+                if groups as f64 > WIDE {
+                    self.work += FAR_WORK;
+                    match self.ball.far_neighbours(self.field, a, PAD + first, at) {
+                        None => return,
+                        Some(tighter) => at = tighter,
                     }
+                    offsets = Offsets::of(&at);
+                    rows = BoxRows::of(on, a, &offsets);
+                    groups = self.row_bounds.fill::<V>(&rises, &self.ball, &at, of_rows(rows));
                 }
-            };
+                self.work += groups + 6 * rows.count;
+                narrow = Some(&self.row_bounds);
+            } else {
+                self.work += rows.count * row_work(1, wide as usize + 1);
+            }
+            raise_sample::<V>(self.field, on, [a, first as i64], rows, &offsets, narrow, out);
+            return;
         }
-        if let Some(group) = open {
-            self.raise_group(a, &group, out);
+        if wide > 4.0 && at.groups() > WIDE {
+            self.work += FAR_WORK;
+            match self.ball.far_neighbours(self.field, a, PAD + first, at) {
+                None => return,
+                Some(tighter) => at = tighter,
+            }
         }
-    }
-
-    #[inline(always)]
-    fn raise_group(&mut self, a: i64, group: &Group, out: &mut Targets) {
-        self.work += group.work;
-        let run = Run { a, first: group.first, len: group.len };
-        let at = &group.at;
-        if at.y[1] - at.y[0] > TALL && at.x[1] - at.x[0] > 1.0 {
-            let beside = Beside::new(&group.rises, self.ball.step_mm, self.ball.slack_mm);
-            raise_run::<V, P>(self.field, self.pairs, run, at, out, Some(&beside));
-        } else {
-            raise_run::<V, P>(self.field, self.pairs, run, at, out, None);
-        }
+        self.work += ((at.y[1] - at.y[0]) as usize + 1) * row_work(1, (at.x[1] - at.x[0]) as usize + 1);
+        let narrowed = at.y[1] - at.y[0] > TALL && at.x[1] - at.x[0] > 1.0;
+        let rises = self.lanes.at(r, lane);
+        let beside = narrowed.then(|| Beside::new(&rises, self.ball.step_mm, self.ball.slack_mm));
+        let run = Run { a, first, len: 1 };
+        raise_run::<V, P>(self.field, self.pairs, run, &at, out, beside.as_ref());
     }
 }
 
@@ -299,32 +430,4 @@ fn count(bits: &[u16; ROWS]) -> u32 {
         sum += bits.count_ones();
     }
     sum
-}
-
-/// Samples of a row that are taken together.
-struct Group {
-    first: usize,
-    len: usize,
-    rises: Rises,
-    at: Reachable,
-    work: usize,
-}
-
-impl Group {
-    #[inline(always)]
-    fn new(first: usize, rises: Rises, at: Reachable) -> Group {
-        Group { first, len: 1, rises, at, work: Group::work(1, &at) }
-    }
-
-    #[inline(always)]
-    fn work(len: usize, at: &Reachable) -> usize {
-        ((at.y[1] - at.y[0]) as usize + 1) * row_work(len, (at.x[1] - at.x[0]) as usize + 1)
-    }
-
-    #[inline(always)]
-    fn with(&self, other: &Group) -> Group {
-        let at = self.at.hull(&other.at);
-        let len = other.first + other.len - self.first;
-        Group { first: self.first, len, rises: self.rises.with(other.rises), at, work: Group::work(len, &at) }
-    }
 }

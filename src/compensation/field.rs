@@ -121,18 +121,21 @@ fn stride(columns: usize) -> usize {
     ((columns + 2 * PAD).div_ceil(LANES) | 1) * LANES
 }
 
-/// Cutter positions as kernels write them.
+/// Cutter positions as kernels write them, in whole cache lines.
 pub(super) struct Targets {
     pub columns: usize,
     pub rows: usize,
     stride: usize,
+    /// Where the first row starts.
+    origin: usize,
     z: Vec<f32>,
 }
 
 impl Targets {
     pub fn new(columns: usize, rows: usize) -> Targets {
-        let stride = ((columns + TILE).div_ceil(LANES) | 1) * LANES;
-        Targets { columns, rows, stride, z: vec![NONE; stride * rows] }
+        let mut targets = Targets { columns: 0, rows: 0, stride: 0, origin: 0, z: Vec::new() };
+        targets.clear(columns, rows);
+        targets
     }
 
     /// Becomes [`Targets::new`], in the memory it has.
@@ -141,17 +144,18 @@ impl Targets {
         self.rows = rows;
         self.stride = ((columns + TILE).div_ceil(LANES) | 1) * LANES;
         self.z.clear();
-        resize(&mut self.z, self.stride * rows);
+        resize(&mut self.z, self.stride * rows + LANES);
+        self.origin = self.z.as_ptr().align_offset(size_of::<[f32; LANES]>()).min(LANES);
     }
 
     /// Row `row` with its padding: column 0 stands at 0.
     #[inline(always)]
     pub fn row(&self, row: usize) -> &[f32] {
-        &self.z[row * self.stride..][..self.stride]
+        &self.z[self.origin + row * self.stride..][..self.stride]
     }
 
     #[inline(always)]
     pub fn row_mut(&mut self, row: usize) -> &mut [f32] {
-        &mut self.z[row * self.stride..][..self.stride]
+        &mut self.z[self.origin + row * self.stride..][..self.stride]
     }
 }

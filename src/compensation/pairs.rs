@@ -29,6 +29,11 @@ pub(super) trait Pairs: Sync {
         false
     }
 
+    /// These pairs, if positions are samples.
+    fn on_samples(&self) -> Option<&OnSamples<'_>> {
+        None
+    }
+
     /// A bound on the rounding of two table entries, in mm.
     fn slack_mm(&self) -> f32;
 }
@@ -94,7 +99,12 @@ impl Pairs for OnSamples<'_> {
     }
 
     fn is_whole(&self) -> bool {
-        self.stencil.fx == 0.0 && self.stencil.fy == 0.0
+        true
+    }
+
+    #[inline(always)]
+    fn on_samples(&self) -> Option<&OnSamples<'_>> {
+        Some(self)
     }
 
     fn slack_mm(&self) -> f32 {

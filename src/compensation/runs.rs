@@ -1,8 +1,9 @@
 use super::ball::Reachable;
+use super::blocks::RowBounds;
 use super::field::{Field, PAD, Targets};
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors, groups, groups_mut};
-use super::pairs::Pairs;
+use super::pairs::{OnSamples, Pairs};
 use super::stencil::ArcRef;
 
 /// Samples of a run that may be taken one by one: a stencil's padding covers so many.
@@ -103,5 +104,177 @@ pub(super) fn raise_row<V: Vectors, P: Pairs>(
             }
             V::store(best, to);
         }
+    }
+}
+
+/// Offsets in whole samples.
+#[derive(Clone, Copy)]
+pub(super) struct Offsets {
+    pub x: [i32; 2],
+    pub y: [i32; 2],
+}
+
+impl Offsets {
+    #[inline(always)]
+    pub fn of(at: &Reachable) -> Offsets {
+        let whole = |[low, high]: [f64; 2]| [low.ceil() as i32, high.floor() as i32];
+        Offsets { x: whole(at.x), y: whole(at.y) }
+    }
+}
+
+/// Samples of a row of a block: the first one's column, and how many.
+pub(super) type Span = [usize; 2];
+
+/// [`raise_run`] of the rows of a block, on samples. Target rows are taken in whole cache lines:
+/// what was just written is read again at the same places, which does not wait for the write.
+#[inline(always)]
+pub(super) fn raise_spans<V: Vectors>(
+    field: &Field,
+    on: &OnSamples,
+    a: i64,
+    spans: &[Span],
+    at: &Offsets,
+    out: &mut Targets,
+) {
+    let every = on.every as i32;
+    for dy in at.y[0]..=at.y[1] {
+        let Some(arc) = on.stencil.arc(i64::from(dy)) else { continue };
+        let (lo, hi) = (at.x[0].max(arc.arc.lo), at.x[1].min(arc.arc.hi));
+        if lo > hi {
+            continue;
+        }
+        let s = &arc.values[arc.index(hi)..][..(hi - lo + 1) as usize];
+        let row = (on.input_row + a - on.target_row) as i32 - dy;
+        let (mut r, mut b) = first_row(row, every);
+        while r < spans.len() && b < on.target_rows {
+            let [first, len] = spans[r];
+            if len > 0 {
+                let origin = first as i64 - on.shift;
+                let start = (origin - i64::from(hi)).max(0) as usize / LANES * LANES;
+                let end = (origin + len as i64 - i64::from(lo)).min(out.columns as i64);
+                if (start as i64) < end {
+                    let length = (end as usize - start).next_multiple_of(LANES);
+                    let from = (PAD as i64 + start as i64 + on.shift + i64::from(lo)) as usize;
+                    let input = &field.row(a + r as i64)[from..][..length + s.len() - 1];
+                    raise_line::<V>(&mut out.row_mut(b)[start..][..length], input, s);
+                }
+            }
+            r += every as usize;
+            b += 1;
+        }
+    }
+}
+
+/// The first row of a block, counted from where row 0 belongs to the target `row` (in rows of
+/// samples), that belongs to a target, and this target.
+#[inline(always)]
+fn first_row(row: i32, every: i32) -> (usize, usize) {
+    if row < 0 && every == 1 {
+        (-row as usize, 0)
+    } else if every == 1 {
+        (0, row as usize)
+    } else if row < 0 {
+        (-row as usize, 0)
+    } else {
+        let b = (row as u32).div_ceil(every as u32);
+        (b as usize * every as usize - row as usize, b as usize)
+    }
+}
+
+/// to = max(to, input shifted + s), s of the highest offset first.
+#[inline(always)]
+fn raise_line<V: Vectors>(to: &mut [f32], input: &[f32], s: &[f32]) {
+    let to = groups_mut(to);
+    match *s {
+        [s] => {
+            let s = V::splat(s);
+            for (to, z) in to.iter_mut().zip(groups(input)) {
+                V::store(V::greater(V::add(V::load(z), s), V::load(to)), to);
+            }
+        }
+        [t, s] => {
+            let (s, t) = (V::splat(s), V::splat(t));
+            let next = groups(&input[1..]);
+            for ((to, z), next) in to.iter_mut().zip(groups(input)).zip(next) {
+                let best = V::greater(V::add(V::load(z), s), V::load(to));
+                V::store(V::greater(V::add(V::load(next), t), best), to);
+            }
+        }
+        _ => {
+            for (g, to) in to.iter_mut().enumerate() {
+                let mut best = V::load(to);
+                for (k, s) in s.iter().rev().enumerate() {
+                    let z = groups(&input[g * LANES + k..][..LANES]);
+                    best = V::greater(V::add(V::load(&z[0]), V::splat(*s)), best);
+                }
+                V::store(best, to);
+            }
+        }
+    }
+}
+
+/// The rows of a box in which one sample can touch targets, on samples.
+#[derive(Clone, Copy)]
+pub(super) struct BoxRows {
+    /// First target, and how many.
+    first: usize,
+    pub count: usize,
+    /// dy of the first; the others are `every` less each.
+    pub dy: i32,
+}
+
+impl BoxRows {
+    #[inline(always)]
+    pub fn of(on: &OnSamples, a: i64, at: &Offsets) -> BoxRows {
+        let every = on.every as i32;
+        let row = (on.input_row + a - on.target_row) as i32;
+        let low = (row - at.y[1]).max(0) as u32;
+        let high = row - at.y[0];
+        let (first, end) = if every == 1 {
+            (low as usize, high + 1)
+        } else {
+            (low.div_ceil(every as u32) as usize, if high < 0 { 0 } else { high / every + 1 })
+        };
+        let end = (end.max(0) as usize).min(on.target_rows);
+        BoxRows { first, count: end.saturating_sub(first), dy: row - first as i32 * every }
+    }
+}
+
+/// [`raise_run`] of one sample, on samples: at the offsets of a box, or at those of `narrow`, row
+/// by row, if it is given.
+#[inline(always)]
+pub(super) fn raise_sample<V: Vectors>(
+    field: &Field,
+    on: &OnSamples,
+    [a, first]: [i64; 2],
+    rows: BoxRows,
+    at: &Offsets,
+    narrow: Option<&RowBounds>,
+    out: &mut Targets,
+) {
+    let origin = first - on.shift;
+    let z = V::splat(field.row(a)[PAD + first as usize]);
+    let mut dy = rows.dy;
+    for k in 0..rows.count {
+        if let Some(arc) = on.stencil.arc(i64::from(dy)) {
+            let [low, high] = match narrow {
+                Some(narrow) => {
+                    [narrow.low[k / LANES][k % LANES] as i32, narrow.high[k / LANES][k % LANES] as i32]
+                }
+                None => at.x,
+            };
+            let (lo, hi) = (low.max(arc.arc.lo), high.min(arc.arc.hi));
+            let start = (origin - i64::from(hi)).max(0) / LANES as i64 * LANES as i64;
+            let end = (origin - i64::from(lo) + 1).min(out.columns as i64);
+            if lo <= hi && start < end {
+                let length = ((end - start) as usize).next_multiple_of(LANES);
+                let s = &arc.values[arc.index((origin - start) as i32)..][..length];
+                let to = &mut out.row_mut(rows.first + k)[start as usize..][..length];
+                for (to, s) in groups_mut(to).iter_mut().zip(groups(s)) {
+                    V::store(V::greater(V::add(V::load(s), z), V::load(to)), to);
+                }
+            }
+        }
+        dy -= on.every as i32;
     }
 }
