@@ -36,8 +36,8 @@ pub(super) fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, skip_flat: bo
     }
 }
 
-/// Groups of lanes that [`every_tap`] takes for these targets.
-pub(super) fn work(profile: &Profile, out: &Targets) -> f64 {
+/// Groups of lanes that [`every_tap`] takes for so many targets.
+pub(super) fn work(profile: &Profile, columns: usize, rows: usize) -> f64 {
     let taps = std::f64::consts::PI * profile.radius() * profile.radius();
-    taps * out.rows as f64 * out.columns.div_ceil(LANES) as f64
+    taps * rows as f64 * columns.div_ceil(LANES) as f64
 }

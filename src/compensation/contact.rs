@@ -15,6 +15,7 @@
 use super::Profile;
 use super::ball::{Ball, Reachable};
 use super::blocks::{Block, Boxes, Lanes, Moderate, ROWS, RowBounds, measure};
+use super::feed::Feed;
 use super::field::{Field, PAD, Targets};
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors, widest};
@@ -53,15 +54,16 @@ const TALL: f64 = 3.0;
 widest! {
     /// Raises the targets by every sample of the field that can touch a cutter there, or sets
     /// `given_up` because it is more work than `every_tap`, in groups of lanes.
-    fn contacts<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, out: &mut Targets, every_tap: f64, given_up: &mut bool) = body
+    fn contacts<P: Pairs>(field: &mut Field, pairs: &P, profile: &Profile, out: &mut Targets, feed: Option<&mut Feed<'_, '_>>, every_tap: f64, given_up: &mut bool) = body
 }
 
 #[inline(always)]
 pub(super) fn body<V: Vectors, P: Pairs>(
-    field: &Field,
+    field: &mut Field,
     pairs: &P,
     profile: &Profile,
     out: &mut Targets,
+    mut feed: Option<&mut Feed<'_, '_>>,
     every_tap: f64,
     given_up: &mut bool,
 ) {
@@ -70,6 +72,7 @@ pub(super) fn body<V: Vectors, P: Pairs>(
         *given_up = !unboxed::contacts::<V, P>(field, pairs, &ball, every_tap, out);
         return;
     }
+    let known = vec![[Known::default(); 2]; field.columns.div_ceil(LANES) + 1];
     let mut search = Search::<V, P> {
         field,
         pairs,
@@ -83,15 +86,26 @@ pub(super) fn body<V: Vectors, P: Pairs>(
         whole: pairs.is_whole(),
         alike_mm: (0.4 * ball.step_mm / ball.radius) as f32,
         work: 0,
-        known: vec![[Known::default(); 2]; field.columns.div_ceil(LANES) + 1],
+        known,
     };
-    for a in (0..field.rows).step_by(ROWS) {
-        let part = a as f64 / field.rows as f64;
+    let rows = search.field.rows;
+    for a in (0..rows).step_by(ROWS) {
+        let part = a as f64 / rows as f64;
         if part > 0.015 && search.work as f64 > part * every_tap {
             *given_up = true;
             return;
         }
-        search.rows(a as i64, ROWS.min(field.rows - a), out);
+        let count = ROWS.min(rows - a);
+        if let Some(feed) = &mut feed {
+            feed.before(a as i64, count, search.field, out);
+        }
+        search.rows(a as i64, count, out);
+        if let Some(feed) = &mut feed {
+            feed.after((a + count) as i64, out);
+        }
+    }
+    if let Some(feed) = &mut feed {
+        feed.end(out);
     }
 }
 
@@ -116,7 +130,7 @@ struct Level {
 }
 
 struct Search<'a, V: Vectors, P: Pairs> {
-    field: &'a Field,
+    field: &'a mut Field,
     pairs: &'a P,
     ball: Ball,
     moderate: Option<Moderate>,

@@ -50,47 +50,62 @@ impl Sense {
 }
 
 /// Rows of heights as kernels read them: padded, no data as [`NONE`], with a row of no data below
-/// the first and above the last.
+/// the first and above the last. A field may hold only its latest rows.
 pub(super) struct Field {
     pub rows: usize,
     /// Columns of data; column 0 stands at PAD in a row.
     pub columns: usize,
     stride: usize,
+    /// Row -1 stands at 0; where not all rows are held, one less than their power of two.
+    mask: usize,
     z: Vec<f32>,
 }
 
 impl Field {
     pub fn empty(columns: usize, rows: usize) -> Field {
         let stride = stride(columns);
-        Field { rows, columns, stride, z: vec![NONE; stride * (rows + 2)] }
+        Field { rows, columns, stride, mask: usize::MAX, z: vec![NONE; stride * (rows + 2)] }
     }
 
     /// The samples of `window`, as far as `h` has them.
     pub fn of(h: &Heights, window: Window, sense: Sense) -> Field {
-        let mut field = Field { rows: 0, columns: 0, stride: 0, z: Vec::new() };
+        let mut field = Field::empty(0, 0);
         field.fill(h, window, sense);
         field
     }
 
     /// Becomes [`Field::of`] these, in the memory it has.
     pub fn fill(&mut self, h: &Heights, window: Window, sense: Sense) {
+        self.hold(window, usize::MAX);
+        for row in -1..=window.rows as i64 {
+            self.take(row, h, window, sense);
+        }
+    }
+
+    /// Becomes a field of this size that holds so many rows, at least, once they are taken.
+    pub fn hold(&mut self, window: Window, held: usize) {
         self.rows = window.rows;
         self.columns = window.columns;
         self.stride = stride(window.columns);
-        resize(&mut self.z, self.stride * (window.rows + 2));
-        let shared = h.window.intersection(&window);
-        for (k, to) in self.z.chunks_exact_mut(self.stride).enumerate() {
-            let row = window.row + k as i64 - 1;
-            match shared.filter(|shared| row >= shared.row && row < shared.row_end()) {
-                None => to.fill(NONE),
-                Some(shared) => {
-                    let from = &h.row(row)[(shared.column - h.window.column) as usize..][..shared.columns];
-                    let (before, to) = to.split_at_mut(PAD + (shared.column - window.column) as usize);
-                    let (to, after) = to.split_at_mut(shared.columns);
-                    before.fill(NONE);
-                    after.fill(NONE);
-                    sense.take_row(to, from);
-                }
+        let all = window.rows + 2;
+        let held = if held < all { held.next_power_of_two() } else { all };
+        self.mask = if held < all { held - 1 } else { usize::MAX };
+        resize(&mut self.z, self.stride * held);
+    }
+
+    /// Takes a row, from -1 to `rows`, of the samples of `window`.
+    pub fn take(&mut self, row: i64, h: &Heights, window: Window, sense: Sense) {
+        let to = &mut self.z[((row + 1) as usize & self.mask) * self.stride..][..self.stride];
+        let row = window.row + row;
+        match h.window.intersection(&window).filter(|shared| row >= shared.row && row < shared.row_end()) {
+            None => to.fill(NONE),
+            Some(shared) => {
+                let from = &h.row(row)[(shared.column - h.window.column) as usize..][..shared.columns];
+                let (before, to) = to.split_at_mut(PAD + (shared.column - window.column) as usize);
+                let (to, after) = to.split_at_mut(shared.columns);
+                before.fill(NONE);
+                after.fill(NONE);
+                sense.take_row(to, from);
             }
         }
     }
@@ -98,11 +113,11 @@ impl Field {
     /// Row `row`, from -1 to `rows`, with its padding.
     #[inline(always)]
     pub fn row(&self, row: i64) -> &[f32] {
-        &self.z[(row + 1) as usize * self.stride..][..self.stride]
+        &self.z[((row + 1) as usize & self.mask) * self.stride..][..self.stride]
     }
 
     pub fn row_mut(&mut self, row: usize) -> &mut [f32] {
-        &mut self.z[(row + 1) * self.stride..][..self.stride]
+        &mut self.z[((row + 1) & self.mask) * self.stride..][..self.stride]
     }
 }
 
@@ -121,41 +136,73 @@ fn stride(columns: usize) -> usize {
     ((columns + 2 * PAD).div_ceil(LANES) | 1) * LANES
 }
 
-/// Cutter positions as kernels write them, in whole cache lines.
+/// Cutter positions as kernels write them, in whole cache lines; not all rows need be held at once.
 pub(super) struct Targets {
     pub columns: usize,
     pub rows: usize,
     stride: usize,
-    /// Where the first row starts.
+    /// Where the memory of the rows starts.
     origin: usize,
+    /// Rows that there is memory for, the first row that is held, and its place.
+    held: usize,
+    first: usize,
+    place: usize,
     z: Vec<f32>,
 }
 
 impl Targets {
     pub fn new(columns: usize, rows: usize) -> Targets {
-        let mut targets = Targets { columns: 0, rows: 0, stride: 0, origin: 0, z: Vec::new() };
+        let z = Vec::new();
+        let mut targets = Targets { columns, rows, stride: 0, origin: 0, held: 0, first: 0, place: 0, z };
         targets.clear(columns, rows);
         targets
     }
 
     /// Becomes [`Targets::new`], in the memory it has.
     pub fn clear(&mut self, columns: usize, rows: usize) {
+        self.hold(columns, rows, rows);
+        for row in 0..rows {
+            self.open(row);
+        }
+    }
+
+    /// Becomes rows of which so many are held at once, none of them open yet.
+    pub fn hold(&mut self, columns: usize, rows: usize, held: usize) {
         self.columns = columns;
         self.rows = rows;
         self.stride = ((columns + TILE).div_ceil(LANES) | 1) * LANES;
-        self.z.clear();
-        resize(&mut self.z, self.stride * rows + LANES);
+        self.held = held.min(rows);
+        (self.first, self.place) = (0, 0);
+        resize(&mut self.z, self.stride * self.held + LANES);
         self.origin = self.z.as_ptr().align_offset(size_of::<[f32; LANES]>()).min(LANES);
+    }
+
+    /// Makes a row ready to be raised.
+    pub fn open(&mut self, row: usize) {
+        self.row_mut(row).fill(NONE);
+    }
+
+    /// Lets the first row go.
+    pub fn close(&mut self) {
+        self.first += 1;
+        self.place = if self.place + 1 == self.held { 0 } else { self.place + 1 };
+    }
+
+    #[inline(always)]
+    fn start(&self, row: usize) -> usize {
+        let place = self.place + (row - self.first);
+        self.origin + if place < self.held { place } else { place - self.held } * self.stride
     }
 
     /// Row `row` with its padding: column 0 stands at 0.
     #[inline(always)]
     pub fn row(&self, row: usize) -> &[f32] {
-        &self.z[self.origin + row * self.stride..][..self.stride]
+        &self.z[self.start(row)..][..self.stride]
     }
 
     #[inline(always)]
     pub fn row_mut(&mut self, row: usize) -> &mut [f32] {
-        &mut self.z[self.origin + row * self.stride..][..self.stride]
+        let start = self.start(row);
+        &mut self.z[start..][..self.stride]
     }
 }

@@ -22,6 +22,7 @@ mod brute;
 mod chord;
 mod contact;
 mod drop;
+mod feed;
 mod field;
 mod interval;
 mod lanes;

@@ -125,7 +125,7 @@ fn few_rows(h: &Heights, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f3
         slack_mm: stencils.iter().fold(0.0, |m, s| s.slack_mm.max(m)),
     };
     let mut done = Targets::new(columns, rows.len());
-    dilate(&Field::of(h, input, Sense::Raise), &pairs, profile, &mut done);
+    dilate(&mut Field::of(h, input, Sense::Raise), &pairs, profile, &mut done);
     targets
         .iter()
         .enumerate()
@@ -239,6 +239,6 @@ fn tile_under_passes(passes: &[&RowPass], profile: &Profile, tile: Window) -> Ta
         shift: halo,
     };
     let mut targets = Targets::new(tile.columns, tile.rows);
-    dilate(&field, &pairs, profile, &mut targets);
+    dilate(&mut field, &pairs, profile, &mut targets);
     targets
 }

@@ -1,4 +1,6 @@
+use super::feed::Feed;
 use super::field::{Field, Sense, Targets};
+use super::lanes::LANES;
 use super::memory::large_pages;
 use super::pairs::{OnSamples, Pairs};
 use super::stencil::Stencil;
@@ -10,7 +12,10 @@ use rayon::prelude::*;
 const TILE_COLUMNS: usize = 2048;
 
 /// Rows of one tile, at least and at most; a tile reads twice the cutter's reach more.
-const TILE_ROWS: [usize; 2] = [128, 1024];
+const TILE_ROWS: [usize; 2] = [128, 4096];
+
+/// Rows that are held at once where they are not fed.
+const WHOLE_ROWS: usize = 512;
 
 /// Radius of a flat bottom, in samples, from which chords are less work than single samples.
 const LEAST_CHORD: f64 = 2.0;
@@ -74,69 +79,101 @@ fn on_samples(h: &Heights, profile: &Profile, out: Window, every: usize, sense: 
     large_pages(&done.z_mm);
     let stencil = Stencil::new(profile, 0.0, 0.0);
     let columns = out.columns;
-    let across = columns.div_ceil(TILE_COLUMNS);
-    let least = TILE_ROWS[0].max(2 * profile.reach());
+    // All about as wide, so that threads have equal shares.
+    let width = columns.div_ceil(columns.div_ceil(TILE_COLUMNS)).next_multiple_of(LANES);
+    let across = columns.div_ceil(width);
+    let least = TILE_ROWS[0].max(4 * profile.reach());
     let share = (out.rows * across).div_ceil(2 * rayon::current_num_threads());
     let tile_rows = share.clamp(least, TILE_ROWS[1].max(least)).div_ceil(every);
     // Tile by tile, its rows of what is done.
     let mut tiles: Vec<Vec<&mut [f32]>> = Vec::new();
     tiles.resize_with(rows.div_ceil(tile_rows) * across, Vec::new);
     for (row, z_mm) in done.z_mm.chunks_exact_mut(columns).enumerate() {
-        for (column, z_mm) in z_mm.chunks_mut(TILE_COLUMNS).enumerate() {
+        for (column, z_mm) in z_mm.chunks_mut(width).enumerate() {
             tiles[row / tile_rows * across + column].push(z_mm);
         }
     }
+    let of = OnTile { h, profile, stencil: &stencil, every: every as i64, sense, way };
     let scratch = || (Field::empty(0, 0), Targets::new(0, 0));
-    tiles.into_par_iter().enumerate().for_each_init(scratch, |(field, targets), (k, to)| {
+    tiles.into_par_iter().with_max_len(1).enumerate().for_each_init(scratch, |scratch, (k, mut to)| {
         let tile = Window {
-            column: out.column + (k % across * TILE_COLUMNS) as i64,
+            column: out.column + (k % across * width) as i64,
             row: out.row + (k / across * tile_rows * every) as i64,
             columns: to[0].len(),
             rows: to.len(),
         };
-        tile_on_samples(h, profile, &stencil, tile, every as i64, sense, way, field, targets);
-        for (row, to) in to.into_iter().enumerate() {
-            sense.give_row(to, targets.row(row));
-        }
+        of.dilate(tile, &mut to, scratch);
     });
     done
 }
 
-/// One tile: `tile.rows` rows, `every` apart.
-#[allow(clippy::too_many_arguments)]
-fn tile_on_samples(
-    h: &Heights,
-    profile: &Profile,
-    stencil: &Stencil,
-    tile: Window,
+/// What is to be done on each tile: `tile.rows` rows, `every` apart.
+struct OnTile<'a> {
+    h: &'a Heights,
+    profile: &'a Profile,
+    stencil: &'a Stencil,
     every: i64,
     sense: Sense,
     way: Way,
-    field: &mut Field,
-    targets: &mut Targets,
-) {
-    let reach = profile.reach() as i64;
-    // One more than is under the cutter, for its neighbours.
-    let halo = reach + 1;
-    let input = Window {
-        column: tile.column - halo,
-        row: tile.row - halo,
-        columns: tile.columns + 2 * halo as usize,
-        rows: (tile.rows - 1) * every as usize + 1 + 2 * halo as usize,
-    };
-    let pairs = OnSamples {
-        stencil,
-        reach,
-        input_rows: input.rows as i64,
-        input_row: input.row,
-        target_row: tile.row,
-        target_rows: tile.rows,
-        every,
-        shift: halo,
-    };
-    field.fill(h, input, sense);
-    targets.clear(tile.columns, tile.rows);
-    dilate_by(field, &pairs, profile, targets, way);
+}
+
+impl OnTile<'_> {
+    fn dilate(&self, tile: Window, to: &mut [&mut [f32]], (field, targets): &mut (Field, Targets)) {
+        if is_searched(self.profile, self.way) {
+            let (input, pairs) = self.pairs(tile);
+            let most = self.most(tile);
+            let mut given_up = false;
+            let mut feed = Feed::new(self.h, input, self.sense, &pairs, to, field, targets);
+            contact::contacts(field, &pairs, self.profile, targets, Some(&mut feed), most, &mut given_up);
+            if !given_up {
+                return;
+            }
+        }
+        let at_once = WHOLE_ROWS.max(2 * self.profile.reach()).div_ceil(self.every as usize);
+        for (k, to) in to.chunks_mut(at_once).enumerate() {
+            let row = tile.row + (k * at_once) as i64 * self.every;
+            let tile = Window { row, rows: to.len(), ..tile };
+            let (input, pairs) = self.pairs(tile);
+            field.fill(self.h, input, self.sense);
+            targets.clear(tile.columns, tile.rows);
+            without_search(field, &pairs, self.profile, targets, self.way);
+            for (row, to) in to.iter_mut().enumerate() {
+                self.sense.give_row(to, targets.row(row));
+            }
+        }
+    }
+
+    /// What a tile reads, and how its samples are paired.
+    fn pairs(&self, tile: Window) -> (Window, OnSamples<'_>) {
+        let reach = self.profile.reach() as i64;
+        // One more than is under the cutter, for its neighbours.
+        let halo = reach + 1;
+        let input = Window {
+            column: tile.column - halo,
+            row: tile.row - halo,
+            columns: tile.columns + 2 * halo as usize,
+            rows: (tile.rows - 1) * self.every as usize + 1 + 2 * halo as usize,
+        };
+        let pairs = OnSamples {
+            stencil: self.stencil,
+            reach,
+            input_rows: input.rows as i64,
+            input_row: input.row,
+            target_row: tile.row,
+            target_rows: tile.rows,
+            every: self.every,
+            shift: halo,
+        };
+        (input, pairs)
+    }
+
+    /// Work at which looking for contacts is given up.
+    fn most(&self, tile: Window) -> f64 {
+        match self.way {
+            Way::Contacts => f64::INFINITY,
+            _ => brute::work(self.profile, tile.columns, tile.rows),
+        }
+    }
 }
 
 /// How contacts are found; only balls have more than two ways.
@@ -149,12 +186,25 @@ pub enum Way {
     Contacts,
 }
 
-/// Raises the targets by the field, by whichever way suits the profile.
-pub(super) fn dilate<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, targets: &mut Targets) {
-    dilate_by(field, pairs, profile, targets, Way::Known);
+/// Whether contacts are looked for.
+fn is_searched(profile: &Profile, way: Way) -> bool {
+    profile.is_ball() && profile.radius() >= LEAST_SEARCH && way != Way::EveryTap
 }
 
-fn dilate_by<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, targets: &mut Targets, way: Way) {
+/// Raises the targets by the field, by whichever way suits the profile.
+pub(super) fn dilate<P: Pairs>(field: &mut Field, pairs: &P, profile: &Profile, targets: &mut Targets) {
+    if is_searched(profile, Way::Known) {
+        let most = brute::work(profile, targets.columns, targets.rows);
+        let mut given_up = false;
+        contact::contacts(field, pairs, profile, targets, None, most, &mut given_up);
+        if !given_up {
+            return;
+        }
+    }
+    without_search(field, pairs, profile, targets, Way::Known);
+}
+
+fn without_search<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, targets: &mut Targets, way: Way) {
     let plateau = profile.plateau_mm() / profile.step_mm();
     let chords = plateau >= LEAST_CHORD;
     if chords {
@@ -162,14 +212,6 @@ fn dilate_by<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, targets: &mu
         if profile.plateau_mm() >= profile.radius_mm() {
             return;
         }
-    }
-    let mut given_up = !profile.is_ball() || profile.radius() < LEAST_SEARCH || way == Way::EveryTap;
-    if !given_up {
-        let most = if way == Way::Contacts { f64::INFINITY } else { brute::work(profile, targets) };
-        contact::contacts(field, pairs, profile, targets, most, &mut given_up);
-    }
-    if !given_up {
-        return;
     }
     // Where looking for a ball's contacts is too much work, maxima leave nothing out either.
     if profile.is_ball() || profile.radius() < bounded::LEAST_RADIUS || way == Way::EveryTap {
@@ -207,7 +249,8 @@ mod tests {
             shift: halo,
         };
         let field = Field::of(h, input, Sense::Raise);
-        let done = |fill: &dyn Fn(&mut Targets)| {
+        let mut searched = Field::of(h, input, Sense::Raise);
+        let done = |fill: &mut dyn FnMut(&mut Targets)| {
             let mut targets = Targets::new(window.columns, window.rows);
             fill(&mut targets);
             let mut bits = Vec::new();
@@ -216,13 +259,21 @@ mod tests {
             }
             bits
         };
-        let every_tap = done(&|targets| brute::body::<V, _>(&field, &pairs, false, targets));
+        let every_tap = done(&mut |targets| brute::body::<V, _>(&field, &pairs, false, targets));
         let pruned = if profile.is_ball() {
-            done(&|targets| {
-                contact::body::<V, _>(&field, &pairs, &profile, targets, f64::INFINITY, &mut false)
+            done(&mut |targets| {
+                contact::body::<V, _>(
+                    &mut searched,
+                    &pairs,
+                    &profile,
+                    targets,
+                    None,
+                    f64::INFINITY,
+                    &mut false,
+                )
             })
         } else {
-            done(&|targets| {
+            done(&mut |targets| {
                 let plateau = profile.plateau_mm() / profile.step_mm();
                 if plateau > 0.0 {
                     chord::body::<V, _>(&field, &pairs, targets, plateau + 1.0);
