@@ -1,5 +1,7 @@
 //! Compensation against the definitions, to the bit.
 
+#[path = "compensation/drops.rs"]
+mod drops;
 #[path = "compensation/naive.rs"]
 mod naive;
 #[path = "compensation/surfaces.rs"]
@@ -221,5 +223,43 @@ fn lifted_locations_are_the_true_drop() {
         }
         // Positions between the samples' reach and the step's own stood a slope's worth too low.
         assert!(raised_mm > 5e-4, "{text}: {raised_mm}");
+    }
+}
+
+#[test]
+fn faces_lift_to_the_drop_by_its_definition() {
+    let cutters = [
+        ("ball:0.5", 0.0),
+        ("ball:2", 0.0),
+        ("ball:1", 0.004),
+        ("flat:1", 0.0),
+        ("bull:1:0.2", 0.0),
+        ("vee:60:0.1:1", 0.0),
+        ("vee:90:0:0.4", 0.004),
+        ("taper:0.4:30:1", 0.0),
+    ];
+    for seed in [5, 11] {
+        let faces = drops::relief(8, seed);
+        let facets = fast::Facets::new(&faces);
+        cutters.par_iter().for_each(|&(text, allowance_mm)| {
+            let (profile, _) = cutter(text, allowance_mm);
+            let lifting = fast::Faces::new(&facets, &profile);
+            for k in 0..4 {
+                let target = RowTarget { x0_mm: -0.3, y_mm: -0.113 + 0.7871 * f64::from(k), count: 87 };
+                let mut z_mm = vec![f32::NAN; target.count];
+                lifting.lift_row(&target, 0.0373, &mut z_mm);
+                for (i, z_mm) in z_mm.iter().enumerate() {
+                    let place = [target.x0_mm + 0.0373 * i as f64, target.y_mm];
+                    let want_mm = drops::drop_mm(&faces, &profile, place);
+                    let off_mm = f64::from(*z_mm) - want_mm;
+                    assert!(
+                        off_mm.abs() < 1e-7 || z_mm.is_nan() && want_mm == f64::NEG_INFINITY,
+                        "{text} + {allowance_mm} at {place:?}: {z_mm} instead of {want_mm}"
+                    );
+                    let single_mm = lifting.lift_point(place, f64::NAN);
+                    assert!(single_mm.is_nan() && z_mm.is_nan() || (single_mm as f32 - z_mm).abs() < 1e-7);
+                }
+            }
+        });
     }
 }

@@ -2,10 +2,12 @@
 //!
 //! Samples miss what stands between them: on a ridge or a step the true surface is higher than
 //! any of them, and a position from samples gouges by up to some um. Here the cutter is dropped on
-//! the faces themselves, in f64, at every position that its bound says a face could raise.
+//! the faces themselves, in f64: each row meets a face along one stretch and an edge along another, and only
+//! there are they looked at.
 
+use super::facets::Facets;
 use super::meridian::Meridian;
-use super::touch::Face;
+use super::touch::{Band, Rest, Stretch};
 use super::{Profile, RowTarget};
 use crate::grid::Heights;
 use rayon::prelude::*;
@@ -14,17 +16,13 @@ use std::ops::RangeInclusive;
 /// Rows that are lifted together.
 const ROWS: usize = 32;
 
-/// Positions of a row that are compared with a face at once, by many, by few, before each is by itself.
-const LONG_RUN: usize = 32;
-const RUN: usize = 8;
+/// Sides of a cell of the index in those of the mean stretch of axis places that one face or edge holds.
+const CELL: [f64; 2] = [4.0, 1.0];
 
-/// Cells of the index to a cutter's radius.
-const CELLS: f64 = 2.0;
-
-/// Cells of the index at most; more positions than faces would only look at empty ones.
+/// Cells of the index at most.
 const MOST_CELLS: f64 = 4e6;
 
-/// Faces over all cells at most, 4 bytes each.
+/// Faces and edges over all cells at most, 12 bytes each.
 const MOST_MEMBERS: usize = 1 << 25;
 
 /// Raises cutter locations on samples to the exact drop on convex faces: `outlines_mm` are their
@@ -39,7 +37,8 @@ pub fn lift(cl: &mut Heights, every: usize, profile: &Profile, outlines_mm: &[Ve
     if window.columns == 0 {
         return;
     }
-    let faces = Faces::new(outlines_mm, profile);
+    let facets = Facets::new(outlines_mm);
+    let faces = Faces::new(&facets, profile);
     cl.z_mm.par_chunks_mut(ROWS * window.columns).enumerate().for_each(|(chunk, z_mm)| {
         for (k, z_mm) in z_mm.chunks_exact_mut(window.columns).enumerate() {
             let row = window.row + ((chunk * ROWS + k) * every) as i64;
@@ -53,88 +52,132 @@ pub fn lift(cl: &mut Heights, every: usize, profile: &Profile, outlines_mm: &[Ve
     });
 }
 
-/// Convex faces that one cutter may touch, found by place.
+/// Faces and edges as one cutter meets them, found by place.
 #[derive(Debug)]
 pub struct Faces<'a> {
+    facets: &'a Facets,
     meridian: Meridian,
-    faces: Vec<Face<'a>>,
+    rests: Vec<Rest>,
+    bands: Vec<Band>,
     low_mm: [f64; 2],
-    cell_mm: f64,
+    cell_mm: [f64; 2],
     cells: [usize; 2],
-    /// Where each cell's faces begin in `members`, row by row, and where the last one's end.
+    /// Where each cell's members begin, row by row, and where the last one's end.
     starts: Vec<u32>,
-    members: Vec<u32>,
+    members: Vec<Member>,
 }
 
+/// A face or, numbered from their count on, an edge, and the rows between which it holds an axis.
+#[derive(Clone, Copy, Debug)]
+struct Member {
+    low_mm: f32,
+    high_mm: f32,
+    nth: u32,
+}
+
+type Places = [[f64; 2]; 2];
+
 impl<'a> Faces<'a> {
-    /// Outlines as [`lift`] takes them.
-    pub fn new(outlines_mm: &'a [Vec<[f64; 3]>], profile: &Profile) -> Faces<'a> {
+    pub fn new(facets: &'a Facets, profile: &Profile) -> Faces<'a> {
         let meridian = Meridian::new(profile);
-        let faces: Vec<Face> =
-            outlines_mm.iter().filter_map(|outline| Face::new(outline, &meridian)).collect();
-        let reach_mm = profile.radius_mm();
-        let extreme = |axis: usize, sign: f64| {
-            let ends = faces.iter().map(|f| if sign < 0.0 { -f.low[axis] } else { f.high[axis] });
-            sign * (ends.fold(f64::NEG_INFINITY, f64::max) + reach_mm)
-        };
+        let rests: Vec<Rest> = facets.faces.iter().map(|face| Rest::new(face, &meridian)).collect();
+        let bands: Vec<Band> =
+            facets.ridges.iter().map(|ridge| Band::new(ridge, facets, &meridian)).collect();
         let mut all = Faces {
+            facets,
             meridian,
-            faces: Vec::new(),
-            low_mm: [extreme(0, -1.0), extreme(1, -1.0)],
-            cell_mm: reach_mm / CELLS,
+            rests,
+            bands,
+            low_mm: [0.0; 2],
+            cell_mm: [1.0; 2],
             cells: [0; 2],
             starts: vec![0],
             members: Vec::new(),
         };
-        if faces.is_empty() {
-            return all;
-        }
-        let size_mm = [0, 1].map(|axis| extreme(axis, 1.0) - all.low_mm[axis]);
-        all.cell_mm = all.cell_mm.max((size_mm[0] * size_mm[1] / MOST_CELLS).sqrt());
-        loop {
-            all.cells = size_mm.map(|mm| (mm / all.cell_mm).floor() as usize + 1);
-            let held: usize =
-                faces.iter().map(|face| all.span(face).map(|r| r.count()).iter().product::<usize>()).sum();
-            // Long slivers have large boxes.
-            if held <= MOST_MEMBERS || all.cells == [1, 1] {
-                break;
+        all.index();
+        all
+    }
+
+    /// Where the axis may stand on each face and edge.
+    fn places(&self) -> impl Iterator<Item = Places> {
+        let faces = self.facets.faces.iter().zip(&self.rests);
+        let faces = faces.map(|(face, rest)| rest.places(self.facets.corners_of(face)));
+        faces.chain(self.facets.ridges.iter().zip(&self.bands).map(|(r, band)| band.places(r, self.facets)))
+    }
+
+    fn index(&mut self) {
+        let (mut low_mm, mut high_mm) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let (mut sum_mm, mut count) = ([0.0; 2], 0.0);
+        for places in self.places() {
+            for axis in 0..2 {
+                low_mm[axis] = low_mm[axis].min(places[axis][0]);
+                high_mm[axis] = high_mm[axis].max(places[axis][1]);
+                sum_mm[axis] += places[axis][1] - places[axis][0];
             }
-            all.cell_mm *= 2.0;
+            count += 1.0;
         }
+        if count == 0.0 {
+            return;
+        }
+        self.low_mm = low_mm;
+        let size_mm = [0, 1].map(|axis| high_mm[axis] - low_mm[axis]);
+        self.cell_mm = [0, 1].map(|axis| (CELL[axis] * sum_mm[axis] / count).max(1e-6));
+        let most = (size_mm[0] / self.cell_mm[0]).max(1.0) * (size_mm[1] / self.cell_mm[1]).max(1.0);
+        let coarser = (most / MOST_CELLS).max(1.0).sqrt();
+        self.cell_mm = self.cell_mm.map(|mm| mm * coarser);
         // Counted first, so that the index is two flat lists.
-        let mut counts = vec![0u32; all.cells[0] * all.cells[1] + 1];
-        faces.iter().for_each(|face| all.each_cell(face, |cell| counts[cell + 1] += 1));
+        let mut counts = loop {
+            self.cells = [0, 1].map(|axis| (size_mm[axis] / self.cell_mm[axis]).floor() as usize + 1);
+            let mut counts = vec![0u32; self.cells[0] * self.cells[1] + 1];
+            let mut held = 0;
+            for places in self.places() {
+                self.each_cell(&places, |cell| {
+                    counts[cell + 1] = counts[cell + 1].saturating_add(1);
+                    held += 1;
+                });
+            }
+            // Long slivers have large boxes.
+            if held <= MOST_MEMBERS || self.cells == [1, 1] {
+                break counts;
+            }
+            self.cell_mm = self.cell_mm.map(|mm| 2.0 * mm);
+        };
         for cell in 1..counts.len() {
             counts[cell] += counts[cell - 1];
         }
         let mut next = counts.clone();
-        let mut members = vec![0u32; next[next.len() - 1] as usize];
-        for (nth, face) in faces.iter().enumerate() {
-            all.each_cell(face, |cell| {
-                members[next[cell] as usize] = nth as u32;
+        let mut members =
+            vec![Member { low_mm: 0.0, high_mm: 0.0, nth: 0 }; counts[counts.len() - 1] as usize];
+        for (nth, places) in self.places().enumerate() {
+            let [low_mm, high_mm] = places[1];
+            let member = Member {
+                low_mm: (low_mm as f32).next_down(),
+                high_mm: (high_mm as f32).next_up(),
+                nth: nth as u32,
+            };
+            self.each_cell(&places, |cell| {
+                members[next[cell] as usize] = member;
                 next[cell] += 1;
             });
         }
-        Faces { faces, starts: counts, members, ..all }
+        self.starts = counts;
+        self.members = members;
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.faces.is_empty()
+        self.members.is_empty()
     }
 
-    /// The columns and rows of cells from which a cutter can touch a face.
-    fn span(&self, face: &Face) -> [RangeInclusive<usize>; 2] {
-        let reach_mm = self.meridian.reach_mm();
-        [0, 1].map(|axis| {
-            let cell = |mm: f64| ((mm - self.low_mm[axis]) / self.cell_mm).floor().max(0.0) as usize;
+    fn each_cell(&self, places: &Places, mut tell: impl FnMut(usize)) {
+        let [columns, rows]: [RangeInclusive<usize>; 2] = [0, 1].map(|axis| {
             let last = self.cells[axis] - 1;
-            cell(face.low[axis] - reach_mm).min(last)..=cell(face.high[axis] + reach_mm).min(last)
-        })
-    }
-
-    fn each_cell(&self, face: &Face, mut tell: impl FnMut(usize)) {
-        let [columns, rows] = self.span(face);
+            let cell = |mm: f64| {
+                let at = ((mm - self.low_mm[axis]) / self.cell_mm[axis]).floor();
+                (at.max(0.0) as usize).min(last)
+            };
+            cell(places[axis][0])..=cell(places[axis][1])
+        });
         for row in rows {
             for column in columns.clone() {
                 tell(row * self.cells[0] + column);
@@ -144,69 +187,69 @@ impl<'a> Faces<'a> {
 
     /// Place of a coordinate among the cells of an axis; None outside.
     fn cell(&self, axis: usize, mm: f64) -> Option<usize> {
-        let at = ((mm - self.low_mm[axis]) / self.cell_mm).floor();
+        let at = ((mm - self.low_mm[axis]) / self.cell_mm[axis]).floor();
         (at >= 0.0 && at < self.cells[axis] as f64).then_some(at as usize)
-    }
-
-    fn at(&self, column: usize, row: usize) -> &[u32] {
-        let cell = row * self.cells[0] + column;
-        &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
     /// Raises the cutter locations at x0_mm + i pitch_mm of one row to the exact drop.
     pub fn lift_row(&self, target: &RowTarget, pitch_mm: f64, z_mm: &mut [f32]) {
         let Some(row) = self.cell(1, target.y_mm) else { return };
         let count = z_mm.len().min(target.count);
-        let x_mm = |i: usize| target.x0_mm + i as f64 * pitch_mm;
-        let (mut now, mut near) = (Vec::new(), Vec::new());
-        let mut i = 0;
-        while i < count {
-            let Some(column) = self.cell(0, x_mm(i)) else {
-                i += 1;
+        let (mut x_mm, mut now) = (Vec::new(), Vec::new());
+        let at = |i: usize| target.x0_mm + i as f64 * pitch_mm;
+        // Positions before the first cell.
+        let mut from = ((self.low_mm[0] - target.x0_mm) / pitch_mm).ceil().max(0.0) as usize;
+        while from < count {
+            let Some(column) = self.cell(0, at(from)) else {
+                if at(from) > self.low_mm[0] {
+                    return;
+                }
+                from += 1;
                 continue;
             };
-            let end_mm = self.low_mm[0] + (column + 1) as f64 * self.cell_mm;
-            let end = (((end_mm - target.x0_mm) / pitch_mm).ceil() as usize).clamp(i + 1, count);
-            let members = self.at(column, row);
-            for long in (i..end).step_by(LONG_RUN) {
-                let z_mm = &mut z_mm[long..(long + LONG_RUN).min(end)];
-                now.clear();
-                now.extend(z_mm.iter().map(|z| if z.is_nan() { f64::NEG_INFINITY } else { f64::from(*z) }));
-                near.clear();
-                near.extend(
-                    members
-                        .iter()
-                        .map(|&nth| &self.faces[nth as usize])
-                        .filter(|face| face.may_raise(&self.meridian, target.y_mm, |k| x_mm(long + k), &now)),
-                );
-                for (run, now) in now.chunks_mut(RUN).enumerate() {
-                    let x_mm = |k: usize| x_mm(long + run * RUN + k);
-                    for face in &near {
-                        if face.may_raise(&self.meridian, target.y_mm, x_mm, now) {
-                            for (k, now) in now.iter_mut().enumerate() {
-                                *now = face.drop_at([x_mm(k), target.y_mm], &self.meridian, *now);
-                            }
-                        }
-                    }
-                }
-                for (z_mm, now) in z_mm.iter_mut().zip(&now) {
-                    if *now > f64::from(*z_mm) || z_mm.is_nan() && now.is_finite() {
-                        *z_mm = *now as f32;
-                    }
+            let end_mm = self.low_mm[0] + (column + 1) as f64 * self.cell_mm[0];
+            let end = (((end_mm - target.x0_mm) / pitch_mm).ceil() as usize).clamp(from + 1, count);
+            x_mm.clear();
+            x_mm.extend((from..end).map(at));
+            now.clear();
+            let z_mm = &mut z_mm[from..end];
+            now.extend(z_mm.iter().map(|z| if z.is_nan() { f64::NEG_INFINITY } else { f64::from(*z) }));
+            self.raise([column, row], &x_mm, target.y_mm, pitch_mm, &mut now);
+            for (z_mm, now) in z_mm.iter_mut().zip(&now) {
+                if *now > f64::from(*z_mm) || z_mm.is_nan() && now.is_finite() {
+                    *z_mm = *now as f32;
                 }
             }
-            i = end;
+            from = end;
+        }
+    }
+
+    /// Raises positions of one cell.
+    fn raise(&self, [column, row]: [usize; 2], x_mm: &[f64], y_mm: f64, pitch_mm: f64, now: &mut [f64]) {
+        let mut stretch = Stretch { x_mm, y_mm, pitch_mm, now };
+        let cell = row * self.cells[0] + column;
+        let faces = self.facets.faces.len();
+        for member in &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
+            if y_mm < f64::from(member.low_mm) || y_mm > f64::from(member.high_mm) {
+                continue;
+            }
+            let nth = member.nth as usize;
+            if nth < faces {
+                let face = &self.facets.faces[nth];
+                self.rests[nth].raise(face, self.facets.corners_of(face), &mut stretch);
+            } else {
+                let nth = nth - faces;
+                self.bands[nth].raise(&self.facets.ridges[nth], self.facets, &self.meridian, &mut stretch);
+            }
         }
     }
 
     /// The exact drop at one place [x, y], or `z_mm` where that is higher; NaN is no location.
     pub fn lift_point(&self, place_mm: [f64; 2], z_mm: f64) -> f64 {
-        let mut now = if z_mm.is_nan() { f64::NEG_INFINITY } else { z_mm };
+        let mut now = [if z_mm.is_nan() { f64::NEG_INFINITY } else { z_mm }];
         if let (Some(column), Some(row)) = (self.cell(0, place_mm[0]), self.cell(1, place_mm[1])) {
-            for &nth in self.at(column, row) {
-                now = self.faces[nth as usize].drop_at(place_mm, &self.meridian, now);
-            }
+            self.raise([column, row], &place_mm[..1], place_mm[1], 1.0, &mut now);
         }
-        if now.is_finite() { now } else { z_mm }
+        if now[0].is_finite() { now[0] } else { z_mm }
     }
 }

@@ -11,6 +11,9 @@ const LAST_STEP: f64 = 1e-4;
 /// Steps at most; bisection alone needs no more to come to the rounding of a double.
 const MOST_STEPS: usize = 60;
 
+/// Slopes that differ by so small a part may be one.
+const ROUNDING: f64 = 1e-9;
+
 /// All lengths in mm, allowance included.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meridian {
@@ -72,31 +75,6 @@ impl Meridian {
         Some(-self.risen - (r.min(self.reach) - self.tangent) * cone)
     }
 
-    /// Slope over distance at a distance whose square is given; infinite at the rim of a half sphere, None
-    /// outside.
-    pub(super) fn slope_per_mm(&self, squared_mm2: f64) -> Option<f64> {
-        if squared_mm2 > self.reach * self.reach {
-            return None;
-        }
-        if squared_mm2 <= self.flat * self.flat {
-            return Some(0.0);
-        }
-        if self.flat == 0.0 && squared_mm2 <= self.tangent * self.tangent {
-            return Some(1.0 / (self.arc * self.arc - squared_mm2).max(0.0).sqrt());
-        }
-        let r = squared_mm2.sqrt();
-        if r > self.tangent {
-            return self.cone.map(|cone| cone / r);
-        }
-        let d = r - self.flat;
-        Some(d / (r * (self.arc * self.arc - d * d).max(0.0).sqrt()))
-    }
-
-    /// How much any cut through the axis's direction curves at least, per mm.
-    pub(super) fn least_curvature(&self) -> f64 {
-        if self.flat == 0.0 && self.cone.is_none() { 1.0 / self.arc } else { 0.0 }
-    }
-
     /// Distance from the axis at which the outline has this slope; the rim where it is never so steep.
     pub(super) fn contact_mm(&self, slope: f64) -> f64 {
         if slope <= 0.0 {
@@ -105,6 +83,54 @@ impl Meridian {
         match self.cone {
             Some(cone) if slope >= cone => self.reach,
             _ => (self.flat + self.arc * slope / (1.0 + slope * slope).sqrt()).min(self.reach),
+        }
+    }
+
+    /// Whether it is a half sphere alone.
+    pub(super) fn is_ball(&self) -> bool {
+        self.flat == 0.0 && self.cone.is_none()
+    }
+
+    /// Whether it is a disc alone.
+    pub(super) fn is_disc(&self) -> bool {
+        self.arc == 0.0 && self.cone.is_none()
+    }
+
+    /// Where the cutter, less its axis, has a slope between these, in two directions square to each other: bounds
+    /// in the same directions.
+    pub(super) fn offsets(&self, slopes: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+        [0, 1].map(|k| {
+            let ([low, high], other) = (slopes[k], slopes[1 - k]);
+            [-self.farthest(-low, other), self.farthest(high, other)]
+        })
+    }
+
+    /// How far from the axis in one direction the slope in it is `slope` at most and that across it lies
+    /// between these. With k the slope and r the distance, r slope / k, which grows with slope and, but for the
+    /// leap of r where a cone begins, falls with k.
+    fn farthest(&self, slope: f64, across: [f64; 2]) -> f64 {
+        if slope.is_infinite() {
+            return self.reach * slope.signum();
+        }
+        let most = across[0].abs().max(across[1].abs());
+        let least =
+            if across[0] <= 0.0 && across[1] >= 0.0 { 0.0 } else { across[0].abs().min(across[1].abs()) };
+        let (shallow, steep) = (slope.hypot(least), slope.hypot(most));
+        let round = |k: f64| self.flat / k + self.arc / (1.0 + k * k).sqrt();
+        let cone = self.cone.unwrap_or(f64::INFINITY);
+        let before = shallow <= cone * (1.0 + ROUNDING);
+        let past = steep >= cone * (1.0 - ROUNDING);
+        if slope >= 0.0 {
+            let before = if before { round(shallow) } else { 0.0 };
+            let past = if past { self.reach / shallow.max(cone * (1.0 - ROUNDING)) } else { 0.0 };
+            // At no slope the contact is anywhere on the flat.
+            let r = slope * before.max(past);
+            let most = if steep >= cone * (1.0 - ROUNDING) { self.reach } else { round(steep) * steep };
+            if r.is_nan() || slope == 0.0 { self.flat } else { r.min(most) }
+        } else {
+            let before = if before { round(steep.min(cone)) } else { f64::INFINITY };
+            let past = if past { self.reach / steep } else { f64::INFINITY };
+            slope * before.min(past)
         }
     }
 

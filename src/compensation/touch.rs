@@ -1,197 +1,245 @@
-//! The drop of a cutter on one planar face.
+//! Stretches of a row of cutter locations that rest on a plane, or on an edge.
 //!
 //! With s concave, z + s over a face is concave: its maximum is the point whose slope the cutter has, if that
-//! lies on the face, else it is on an edge that this point lies beyond.
+//! lies on the face, else it is on an edge. So a row rests on a plane where that point, shifted along with the
+//! axis, crosses the face, and on an edge where the cutter's slopes there lie between those of its faces.
 
+use super::facets::{Face, Facets};
 use super::meridian::Meridian;
+use super::profile::REACH_MM;
+use super::ridges::{Ridge, down, up};
+use super::weld::SAME_MM;
+use std::ops::Range;
 
-/// A tangent steeper than so many reaches a reach stands near the rim, where rounding makes it no bound.
-const STEEPEST: f64 = 100.0;
+/// Positions of a row that are held against an edge at once.
+const RUN: usize = 16;
 
-#[derive(Debug)]
-pub(super) struct Face<'a> {
-    corners: &'a [[f64; 3]],
-    pub(super) low: [f64; 3],
-    pub(super) high: [f64; 3],
-    /// None for a vertical one, which is its edges.
-    plane: Option<Plane>,
+/// Positions of one row, and the cutter's height at each so far.
+pub(super) struct Stretch<'a> {
+    pub(super) x_mm: &'a [f64],
+    pub(super) y_mm: f64,
+    pub(super) pitch_mm: f64,
+    pub(super) now: &'a mut [f64],
 }
 
-/// z = gradient . p + offset, and the point of the cutter that has its slope.
+impl Stretch<'_> {
+    /// Positions between two places.
+    fn between(&self, [low_mm, high_mm]: [f64; 2]) -> Range<usize> {
+        let at = |mm: f64| (mm - self.x_mm[0]) / self.pitch_mm;
+        let first = at(low_mm).ceil().max(0.0) as usize;
+        let end = ((at(high_mm).floor() + 1.0).max(0.0) as usize).min(self.x_mm.len());
+        first.min(end)..end
+    }
+}
+
+/// The point of the cutter that has a plane's slope.
 #[derive(Debug)]
-struct Plane {
-    gradient: [f64; 2],
-    offset: f64,
-    /// The contact less the axis.
+pub(super) struct Rest {
+    /// Less the axis.
     contact: [f64; 2],
     /// z of the cutter's lowest point above the plane's height at the axis.
     above: f64,
-    /// Mean of the corners, and how far the farthest of them lies from it.
-    middle: [f64; 2],
-    around: f64,
-    /// 1 if the corners go round counter-clockwise seen from above, else -1.
-    turn: f64,
 }
 
-impl<'a> Face<'a> {
-    pub(super) fn new(corners: &'a [[f64; 3]], meridian: &Meridian) -> Option<Face<'a>> {
-        let first = *corners.first()?;
-        let (mut low, mut high) = (first, first);
-        for corner in corners {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(corner[axis]);
-                high[axis] = high[axis].max(corner[axis]);
-            }
-        }
-        // Newell's normal, which bears corners on a line.
-        let mut normal = [0.0; 3];
-        for (i, a) in corners.iter().enumerate() {
-            let b = &corners[(i + 1) % corners.len()];
-            let (a, b) = ([0, 1, 2].map(|k| a[k] - first[k]), [0, 1, 2].map(|k| b[k] - first[k]));
-            for (k, n) in normal.iter_mut().enumerate() {
-                let (p, q) = ((k + 1) % 3, (k + 2) % 3);
-                *n += a[p] * b[q] - a[q] * b[p];
-            }
-        }
-        let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
-        let plane = (normal[2].abs() > 1e-9 * length).then(|| {
-            let gradient = [-normal[0] / normal[2], -normal[1] / normal[2]];
-            let offset = first[2] - gradient[0] * first[0] - gradient[1] * first[1];
-            let slope = gradient[0].hypot(gradient[1]);
-            let r_mm = meridian.contact_mm(slope);
-            let along = if slope > 0.0 { r_mm / slope } else { 0.0 };
-            let contact = gradient.map(|g| g * along);
-            let above = slope * r_mm + meridian.s_mm(r_mm * r_mm).unwrap_or(0.0);
-            let middle = [0, 1].map(|k| corners.iter().map(|c| c[k]).sum::<f64>() / corners.len() as f64);
-            let around = corners.iter().map(|c| (c[0] - middle[0]).hypot(c[1] - middle[1]));
-            let around = around.fold(0.0, f64::max);
-            Plane { gradient, offset, contact, above, middle, around, turn: normal[2].signum() }
-        });
-        Some(Face { corners, low, high, plane })
+impl Rest {
+    pub(super) fn new(face: &Face, meridian: &Meridian) -> Rest {
+        let [gx, gy] = face.gradient;
+        let slope = gx.hypot(gy);
+        let r_mm = meridian.contact_mm(slope);
+        let along = if slope > 0.0 { r_mm / slope } else { 0.0 };
+        let above = slope * r_mm + meridian.s_mm(r_mm * r_mm).unwrap_or(0.0);
+        Rest { contact: [gx * along, gy * along], above }
     }
 
-    /// False where no position of a stretch of a row, x_mm(i) for the heights in `now`, can be raised above
-    /// what it has now.
-    pub(super) fn may_raise(
-        &self,
-        meridian: &Meridian,
-        y_mm: f64,
-        x_mm: impl Fn(usize) -> f64,
-        now: &[f64],
-    ) -> bool {
-        let (first_mm, last_mm) = (x_mm(0), x_mm(now.len() - 1));
-        let beside = (self.low[1] - y_mm).max(y_mm - self.high[1]).max(0.0);
-        let aside = (self.low[0] - last_mm).max(first_mm - self.high[0]).max(0.0);
-        let Some(s) = meridian.s_mm(beside * beside + aside * aside) else { return false };
-        let most = self.high[2] + s;
-        if now.iter().all(|now| *now >= most) {
-            return false;
-        }
-        let Some(plane) = &self.plane else { return true };
-        let middle = [0.5 * (first_mm + last_mm), y_mm];
-        let most = plane.bound(middle, 0.5 * (last_mm - first_mm), meridian);
-        now.iter().enumerate().any(|(i, now)| *now < most + plane.gradient[0] * (x_mm(i) - middle[0]))
+    /// Lowest and highest place of the axis in x and y with the cutter on the face.
+    pub(super) fn places(&self, corners: &[[f64; 3]]) -> [[f64; 2]; 2] {
+        [0, 1].map(|axis| {
+            let at = corners.iter().map(|corner| corner[axis] - self.contact[axis]);
+            at.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mm| [low.min(mm), high.max(mm)])
+        })
     }
 
-    /// The cutter's height on this face at a place of its axis, or `now` where that is higher.
-    pub(super) fn drop_at(&self, axis: [f64; 2], meridian: &Meridian, now: f64) -> f64 {
-        let beside = (self.low[1] - axis[1]).max(axis[1] - self.high[1]).max(0.0);
-        let aside = (self.low[0] - axis[0]).max(axis[0] - self.high[0]).max(0.0);
-        let Some(s) = meridian.s_mm(aside * aside + beside * beside) else { return now };
-        if self.high[2] + s <= now {
-            return now;
-        }
-        let edges = || (0..self.corners.len()).map(|i| [i, (i + 1) % self.corners.len()]);
-        let mut best = now;
-        let Some(plane) = &self.plane else {
-            for [i, j] in edges() {
-                best = on_edge(&self.corners[i], &self.corners[j], axis, meridian, best);
+    /// Raises a stretch to the plane where its point of contact is on the face.
+    pub(super) fn raise(&self, face: &Face, corners: &[[f64; 3]], stretch: &mut Stretch) {
+        let y_mm = stretch.y_mm + self.contact[1];
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut a = &corners[corners.len() - 1];
+        for b in corners {
+            if (a[1] <= y_mm) != (b[1] <= y_mm) {
+                let x_mm = a[0] + (y_mm - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
+                (low, high) = (low.min(x_mm), high.max(x_mm));
             }
-            return best;
+            a = b;
+        }
+        if low > high {
+            return;
+        }
+        let range = stretch.between([low - self.contact[0], high - self.contact[0]]);
+        let [gx, gy] = face.gradient;
+        let first = &corners[0];
+        let base = first[2] + gy * (stretch.y_mm - first[1]) + self.above;
+        for (now, x_mm) in stretch.now[range.clone()].iter_mut().zip(&stretch.x_mm[range]) {
+            let z_mm = base + gx * (x_mm - first[0]);
+            *now = if z_mm > *now { z_mm } else { *now };
+        }
+    }
+}
+
+/// Where the axis may stand with the cutter on an edge, in mm from its first end along the edge and to the
+/// right of it.
+#[derive(Debug)]
+pub(super) struct Band {
+    along: [f32; 2],
+    right: [f32; 2],
+}
+
+/// An edge in its own directions.
+struct Edge<'a> {
+    a: &'a [f64; 3],
+    ux: f64,
+    uy: f64,
+    length: f64,
+    slope: f64,
+    top: f64,
+}
+
+impl<'a> Edge<'a> {
+    fn of(ridge: &Ridge, corners: &'a [[f64; 3]]) -> Edge<'a> {
+        let (a, b) = (&corners[ridge.a as usize], &corners[ridge.b as usize]);
+        let top = a[2].max(b[2]);
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let length = (dx * dx + dy * dy).sqrt();
+        if length == 0.0 {
+            return Edge { a, ux: 1.0, uy: 0.0, length, slope: 0.0, top };
+        }
+        Edge { a, ux: dx / length, uy: dy / length, length, slope: (b[2] - a[2]) / length, top }
+    }
+}
+
+impl Band {
+    pub(super) fn new(ridge: &Ridge, facets: &Facets, meridian: &Meridian) -> Band {
+        let slopes = [ridge.along, ridge.across].map(|range| range.map(f64::from));
+        let [along, left] = meridian.offsets(slopes);
+        let length = Edge::of(ridge, &facets.corners).length;
+        // The axis less the contact, which lies between 0 and the length.
+        Band {
+            along: [down(-along[1] - SAME_MM), up(length - along[0] + SAME_MM)],
+            right: [down(left[0] - SAME_MM), up(left[1] + SAME_MM)],
+        }
+    }
+
+    /// Lowest and highest place of the axis in x and y.
+    pub(super) fn places(&self, ridge: &Ridge, facets: &Facets) -> [[f64; 2]; 2] {
+        let edge = Edge::of(ridge, &facets.corners);
+        let bounds = |origin: f64, along: f64, right: f64| {
+            let ends = |by: f64, range: &[f32; 2]| {
+                let [p, q] = range.map(|mm| f64::from(mm) * by);
+                [p.min(q), p.max(q)]
+            };
+            let (along, right) = (ends(along, &self.along), ends(right, &self.right));
+            [0, 1].map(|end| origin + along[end] + right[end])
         };
-        if plane.bound(axis, 0.0, meridian) <= now {
-            return now;
-        }
-        let p = [axis[0] + plane.contact[0], axis[1] + plane.contact[1]];
-        let mut covers = true;
-        for [i, j] in edges() {
-            let (a, b) = (&self.corners[i], &self.corners[j]);
-            let side = (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
-            // From any other edge the heights rise towards the contact, through the face.
-            if side * plane.turn < 0.0 {
-                covers = false;
-                best = on_edge(a, b, axis, meridian, best);
+        [bounds(edge.a[0], edge.ux, edge.uy), bounds(edge.a[1], edge.uy, -edge.ux)]
+    }
+
+    /// Raises the part of a stretch that may rest on the edge.
+    pub(super) fn raise(&self, ridge: &Ridge, facets: &Facets, meridian: &Meridian, stretch: &mut Stretch) {
+        let edge = Edge::of(ridge, &facets.corners);
+        let dy = stretch.y_mm - edge.a[1];
+        let along = part(edge.ux, dy * edge.uy, &self.along);
+        let right = part(edge.uy, -dy * edge.ux, &self.right);
+        let x_mm = [along[0].max(right[0]) + edge.a[0], along[1].min(right[1]) + edge.a[0]];
+        let range = stretch.between(x_mm);
+        let one_run = range.len() <= RUN;
+        for start in range.clone().step_by(RUN) {
+            let run = start..(start + RUN).min(range.end);
+            let (x_mm, now) = (&stretch.x_mm[run.clone()], &mut stretch.now[run]);
+            if one_run || edge.may_raise(dy, meridian, x_mm, now) {
+                edge.raise(dy, meridian, x_mm, now);
             }
         }
-        if covers { plane.at(axis) + plane.above } else { best }
     }
 }
 
-impl Plane {
-    fn at(&self, p: [f64; 2]) -> f64 {
-        self.gradient[0] * p[0] + self.gradient[1] * p[1] + self.offset
-    }
-
-    /// z + s over the face with the axis up to `half` along x from `axis`: what it exceeds nowhere once the
-    /// plane's own rise with the axis is taken off.
-    ///
-    /// It lies below the plane's contact, and below its tangent at the face's middle, from which it falls by
-    /// at least half the cutter's least curvature times the square of the distance.
-    fn bound(&self, axis: [f64; 2], half: f64, meridian: &Meridian) -> f64 {
-        let most = self.at(axis) + self.above;
-        let away = [self.middle[0] - axis[0], self.middle[1] - axis[1]];
-        let squared = away[0] * away[0] + away[1] * away[1];
-        let Some(s) = meridian.s_mm(squared) else { return most };
-        let Some(per_mm) = meridian.slope_per_mm(squared) else { return most };
-        if per_mm * meridian.reach_mm() >= STEEPEST {
-            return most;
-        }
-        let rises = [0, 1].map(|k| self.gradient[k] - per_mm * away[k]);
-        let rise = (rises[0] * rises[0] + rises[1] * rises[1]).sqrt();
-        let curvature = meridian.least_curvature();
-        let farthest = self.around + half;
-        let distance = if rise < curvature * farthest { rise / curvature } else { farthest };
-        most.min(self.at(self.middle) + s + (rise - 0.5 * curvature * distance) * distance)
-    }
-}
-
-/// The cutter's height on an edge, or `now` where that is higher.
-fn on_edge(a: &[f64; 3], b: &[f64; 3], axis: [f64; 2], meridian: &Meridian, now: f64) -> f64 {
-    if a[2].max(b[2]) <= now {
-        return now;
-    }
-    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-    let length = (dx * dx + dy * dy).sqrt();
-    let reach = meridian.reach_mm();
-    let (ax, ay) = (axis[0] - a[0], axis[1] - a[1]);
-    let on = |squared: f64, z: f64| meridian.s_mm(squared).map_or(now, |s| (z + s).max(now));
-    if length < 1e-12 {
-        return on(ax * ax + ay * ay, a[2].max(b[2]));
-    }
-    let (ux, uy) = (dx / length, dy / length);
-    let (foot, off) = (ax * ux + ay * uy, ax * uy - ay * ux);
-    let off2 = off * off;
-    if off2 > reach * reach {
-        // A line along the rim may lie past it by rounding, with an end or all of it.
-        return on(ax * ax + ay * ay, a[2]).max(on((ax - dx).powi(2) + (ay - dy).powi(2), b[2]));
-    }
-    let half = (reach * reach - off2).sqrt();
-    let (low, high) = ((-foot).max(-half), (length - foot).min(half));
-    if low > high {
-        // An end that lies on the cutter's rim but for rounding.
-        return on(ax * ax + ay * ay, a[2]).max(on((ax - dx).powi(2) + (ay - dy).powi(2), b[2]));
-    }
-    let slope = (b[2] - a[2]) / length;
-    let at_foot = a[2] + slope * foot;
-    let nearest = 0f64.clamp(low, high);
-    if on(off2 + nearest * nearest, at_foot + (slope * low).max(slope * high)) <= now {
-        return now;
-    }
-    // Mirrored where the edge falls.
-    let u = if slope < 0.0 {
-        -meridian.along_mm(off2, -slope, -high, -low)
+/// Where `by` x + `more` lies in a range.
+fn part(by: f64, more: f64, range: &[f32; 2]) -> [f64; 2] {
+    let [low, high] = range.map(|mm| f64::from(mm) - more);
+    if by > 0.0 {
+        [low / by, high / by]
+    } else if by < 0.0 {
+        [high / by, low / by]
+    } else if low <= 0.0 && high >= 0.0 {
+        [f64::NEG_INFINITY, f64::INFINITY]
     } else {
-        meridian.along_mm(off2, slope, low, high)
-    };
-    on(off2 + u * u, at_foot + slope * u)
+        [f64::INFINITY, f64::NEG_INFINITY]
+    }
+}
+
+impl Edge<'_> {
+    /// Foot of the axis along the edge, from its first end, and distance to the right of it.
+    fn foot(&self, dy: f64, x_mm: f64) -> (f64, f64) {
+        let dx = x_mm - self.a[0];
+        (dx * self.ux + dy * self.uy, dx * self.uy - dy * self.ux)
+    }
+
+    /// False where no position of a run can be raised.
+    fn may_raise(&self, dy: f64, meridian: &Meridian, x_mm: &[f64], now: &[f64]) -> bool {
+        let (first, last) = (self.foot(dy, x_mm[0]), self.foot(dy, x_mm[x_mm.len() - 1]));
+        let off = if first.1 * last.1 <= 0.0 { 0.0 } else { first.1.abs().min(last.1.abs()) };
+        let past = (first.0.min(last.0) - self.length).max(-first.0.max(last.0)).max(0.0);
+        let Some(s_mm) = meridian.s_mm(off * off + past * past) else { return false };
+        let least = now.iter().fold(f64::INFINITY, |least, &now| if now < least { now } else { least });
+        self.top + s_mm > least
+    }
+
+    fn raise(&self, dy: f64, meridian: &Meridian, x_mm: &[f64], now: &mut [f64]) {
+        let reach = meridian.reach_mm();
+        let most = (reach + REACH_MM) * (reach + REACH_MM);
+        if meridian.is_ball() {
+            // Cut along the line, the ball is a circle.
+            let sine = self.slope / (1.0 + self.slope * self.slope).sqrt();
+            for (x_mm, now) in x_mm.iter().zip(now) {
+                let (foot, off) = self.foot(dy, *x_mm);
+                let left = reach * reach - off * off;
+                let u = (left.max(0.0).sqrt() * sine).min(self.length - foot).max(-foot);
+                let z_mm = self.a[2] + self.slope * (foot + u) + (left - u * u).max(0.0).sqrt() - reach;
+                *now = if off * off + u * u <= most && z_mm > *now { z_mm } else { *now };
+            }
+        } else if meridian.is_disc() {
+            let way = if self.slope == 0.0 { 0.0 } else { self.slope.signum() };
+            for (x_mm, now) in x_mm.iter().zip(now) {
+                let (foot, off) = self.foot(dy, *x_mm);
+                let left = reach * reach - off * off;
+                let u = (left.max(0.0).sqrt() * way).min(self.length - foot).max(-foot);
+                let z_mm = self.a[2] + self.slope * (foot + u);
+                *now = if off * off + u * u <= most && z_mm > *now { z_mm } else { *now };
+            }
+        } else {
+            for (x_mm, now) in x_mm.iter().zip(now) {
+                let (foot, off) = self.foot(dy, *x_mm);
+                if let Some(z_mm) = self.height(foot, off * off, meridian)
+                    && z_mm > *now
+                {
+                    *now = z_mm;
+                }
+            }
+        }
+    }
+
+    /// The cutter's height on the edge with its axis off it by a distance (squared).
+    fn height(&self, foot: f64, off2: f64, meridian: &Meridian) -> Option<f64> {
+        let reach = meridian.reach_mm();
+        let half = (reach * reach - off2).max(0.0).sqrt();
+        let (low, high) = ((-foot).max(-half), (self.length - foot).min(half));
+        let u = if low > high {
+            // An end that lies on the cutter's rim but for rounding, or out of reach.
+            if foot < 0.0 { -foot } else { self.length - foot }
+        } else if self.slope < 0.0 {
+            // Mirrored where the edge falls.
+            -meridian.along_mm(off2, -self.slope, -high, -low)
+        } else {
+            meridian.along_mm(off2, self.slope, low, high)
+        };
+        meridian.s_mm(off2 + u * u).map(|s_mm| self.a[2] + self.slope * (foot + u) + s_mm)
+    }
 }

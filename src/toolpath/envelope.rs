@@ -105,7 +105,7 @@ impl Cutter {
         passes: Range<usize>,
     ) -> Vec<Envelope> {
         let across = passes.clone().map(|k| layout.across_mm(k));
-        let exact = self.rows(strip, &self.exact, &Faces::new(&strip.outlines, &self.exact), layout, across);
+        let exact = self.rows(strip, &self.exact, &Faces::new(&strip.facets, &self.exact), layout, across);
         if self.tip_mm <= 0.0 {
             let mut envelopes = self.widened(strip, wide, layout, passes);
             envelopes.par_iter_mut().zip(exact).for_each(|(envelope, cl_mm)| envelope.cl_mm = cl_mm);
@@ -270,7 +270,7 @@ impl Cutter {
 
     /// The faces of a strip as the widened cutter meets them.
     pub(super) fn faces<'a>(&self, strip: &'a Strip) -> Faces<'a> {
-        Faces::new(&strip.outlines, &self.wide)
+        Faces::new(&strip.facets, &self.wide)
     }
 
     /// Locations of a profile along rows like those of the layout, at other places across; never below the

@@ -147,7 +147,7 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
         let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), reach_mm)?;
         let envelopes = cutter.widened(&strip, &cutter.faces(&strip), &layout, first..last + 1);
         let middles = (first..last + 1).map(|k| layout.across_mm(k) - 0.5 * stepover_mm);
-        let faces = Faces::new(&strip.outlines, &between);
+        let faces = Faces::new(&strip.facets, &between);
         let between = cutter.rows(&strip, &between, &faces, &layout, middles);
         let band: Vec<Row> = (first..last + 1)
             .into_par_iter()

@@ -55,7 +55,7 @@ pub(super) fn envelopes(
         let block = Block {
             cutter,
             layout,
-            exact: Faces::new(&strip.outlines, &cutter.exact),
+            exact: Faces::new(&strip.facets, &cutter.exact),
             wide: cutter.faces(&strip),
             places: Places::new(&strip.heights, site.surface.lattice().step_mm),
             missed_mm: strip.missed_mm,

@@ -2,6 +2,7 @@
 
 use super::Error;
 use super::passes::{Axis, Layout};
+use crate::compensation::Facets;
 use crate::grid::{Heights, Window};
 use crate::surface::Surface;
 
@@ -17,8 +18,8 @@ const BLOCK: usize = 4;
 /// Heights in the frame of the passes: columns along, rows across.
 pub(super) struct Strip {
     pub(super) heights: Heights,
-    /// Corners of the planar faces among them, with their datum; none where there are only samples.
-    pub(super) outlines: Vec<Vec<[f64; 3]>>,
+    /// The planar faces among them; none where there are only samples.
+    pub(super) facets: Facets,
     step_mm: f64,
     /// How far a face may stand above its samples.
     pub(super) missed_mm: f64,
@@ -65,15 +66,15 @@ impl Strip {
             return Err(Error::Band { samples: window.samples(), most: MOST_SAMPLES });
         }
         let heights = along.heights(surface, window)?;
-        let outlines = along.outlines(surface, window);
+        let facets = Facets::new(along.outlines(surface, window));
         let [steep_x, steep_y] = surface.steepest();
-        let missed_mm = if outlines.is_empty() { 0.0 } else { step_mm * steep_x.hypot(steep_y) };
+        let missed_mm = if facets.is_empty() { 0.0 } else { step_mm * steep_x.hypot(steep_y) };
         let columns = heights.window.columns;
         let mut blocks = vec![f32::NEG_INFINITY; columns * heights.window.rows.div_ceil(BLOCK)];
         for (rows, block) in heights.z_mm.chunks(BLOCK * columns).zip(blocks.chunks_exact_mut(columns)) {
             rows.chunks_exact(columns).for_each(|row| raise(block, row));
         }
-        Ok(Strip { heights, outlines, step_mm, missed_mm, blocks })
+        Ok(Strip { heights, facets, step_mm, missed_mm, blocks })
     }
 
     /// For a pass at `across_mm`: the highest sample of the square `reach_mm` around each column.
