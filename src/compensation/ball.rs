@@ -97,12 +97,19 @@ impl Ball {
     /// the other axis that may be so from a sample before the axis on.
     #[inline(always)]
     fn start_of(&self, slopes: &Slopes) -> Reachable {
-        let start = |next: f64, before: f64| {
-            let low = less(next * self.radius, 0.0) - 1.0 - ROOM;
-            let high = greater(before * self.radius, 0.0) + 1.0 + ROOM;
-            [greater(low, -self.radius), less(high, self.radius)]
-        };
-        Reachable { x: start(slopes.x_next, slopes.x_before), y: start(slopes.y_next, slopes.y_before) }
+        Reachable {
+            x: self.start_along([slopes.x_next, slopes.x_before], [1.0, 1.0]),
+            y: self.start_along([slopes.y_next, slopes.y_before], [1.0, 1.0]),
+        }
+    }
+
+    /// Bounds along one axis by the mean slopes to the next neighbour and from the one before, so many samples off,
+    /// with nothing known of the other axis.
+    #[inline(always)]
+    pub fn start_along(&self, [next, before]: [f64; 2], off: [f64; 2]) -> [f64; 2] {
+        let low = less(next * self.radius, 0.0) - off[0] - ROOM;
+        let high = greater(before * self.radius, 0.0) + off[1] + ROOM;
+        [greater(low, -self.radius), less(high, self.radius)]
     }
 
     /// Room for the rounding of boxes in f32 and of the table's entries, in samples.
@@ -142,15 +149,18 @@ impl Ball {
 
     #[inline(always)]
     fn slopes(&self, rises: &Rises, m: f64) -> Slopes {
+        let [x_next, x_before] = self.mean_slopes([rises.x_next, rises.x_before], m);
+        let [y_next, y_before] = self.mean_slopes([rises.y_next, rises.y_before], m);
+        Slopes { m, x_next, x_before, y_next, y_before }
+    }
+
+    /// The mean slopes of rises to the next neighbour and from the one before, `m` samples off, widened by what
+    /// rounding can do.
+    #[inline(always)]
+    pub fn mean_slopes(&self, [next, before]: [f32; 2], m: f64) -> [f64; 2] {
         let scale = 1.0 / (m * self.step_mm);
         let give = |rise: f32| self.slack_mm as f64 + rise.abs() as f64 * f32::EPSILON as f64;
-        Slopes {
-            m,
-            x_next: (rises.x_next as f64 - give(rises.x_next)) * scale,
-            x_before: (rises.x_before as f64 + give(rises.x_before)) * scale,
-            y_next: (rises.y_next as f64 - give(rises.y_next)) * scale,
-            y_before: (rises.y_before as f64 + give(rises.y_before)) * scale,
-        }
+        [(next as f64 - give(next)) * scale, (before as f64 + give(before)) * scale]
     }
 
     /// One sweep over both axes.
@@ -167,7 +177,7 @@ impl Ball {
     /// mean is at most Z in the middle, and less by no more than m^2 R^2 / (6 Z^3) while the rim
     /// is far.
     #[inline(always)]
-    fn mean_z(&self, at: &Reachable, m: f64) -> [f64; 2] {
+    pub fn mean_z(&self, at: &Reachable, m: f64) -> [f64; 2] {
         let half = 0.5 * m;
         let near = |[low, high]: [f64; 2]| greater(greater(low, -high) - half, 0.0);
         let far = |[low, high]: [f64; 2]| greater(high, -low) + half;
@@ -186,8 +196,10 @@ impl Ball {
         [low, high]
     }
 
+    /// Bounds along an axis, within `axis` and with the other within `other`, by the mean slopes to neighbours `m`
+    /// samples off.
     #[inline(always)]
-    fn bound(
+    pub fn bound(
         &self,
         axis: [f64; 2],
         other: [f64; 2],

@@ -14,6 +14,11 @@ pub(super) trait Pairs: Sync {
     /// (x of a sample less x of a position) in samples, less its dx.
     fn fx(&self, a: i64, b: usize) -> f64;
 
+    /// The y of an input row in samples, from anywhere; for rows that are no lattice.
+    fn y(&self, a: i64) -> f64 {
+        a as f64
+    }
+
     /// The targets whose row lies y_a - high ..= y_a - low, distances in samples; may give more.
     fn targets(&self, a: i64, low: f64, high: f64) -> Range<usize>;
 
@@ -207,6 +212,12 @@ impl Pairs for UnderPasses<'_> {
     #[inline(always)]
     fn fx(&self, a: i64, _: usize) -> f64 {
         self.stencils[self.passes[a as usize].stencil].fx
+    }
+
+    #[inline(always)]
+    fn y(&self, a: i64) -> f64 {
+        let pass = &self.passes[a as usize];
+        pass.row as f64 + self.stencils[pass.stencil].fy
     }
 
     fn targets(&self, a: i64, low: f64, high: f64) -> Range<usize> {

@@ -32,13 +32,17 @@ const TILE_COLUMNS: usize = 2048;
 /// Rows of one tile under passes, at least.
 const TILE_ROWS: usize = 128;
 
+/// Units of controllers' grids to a sample: what is left of a coordinate on one is known to the last bit.
+const GRID: f64 = 1000.0;
+
 /// A coordinate as a whole sample and what is left, in samples, within half a sample.
 fn split(mm: f64, step_mm: f64) -> (i64, f64) {
     let samples = mm / step_mm - 0.5;
     let whole = samples.round();
     let left = samples - whole;
-    // Positions that are meant to stand on samples share one table and its symmetry.
-    (whole as i64, if left.abs() < 1e-7 { 0.0 } else { left })
+    // Positions that are meant to stand on samples, or on a controller's grid beside them, share one table.
+    let meant = (left * GRID).round() / GRID;
+    (whole as i64, if (left - meant).abs() < 1e-7 { meant } else { left })
 }
 
 /// Cutter locations at x0_mm + i step, y_mm for i < count: s(d) is taken at the true distances.

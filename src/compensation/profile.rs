@@ -93,6 +93,7 @@ impl Profile {
 
     /// s(d): how far the cutter's surface stands below its lowest point's level (so never
     /// positive) at `distance_mm` from its axis; None past the radius.
+    #[inline]
     pub fn s_mm(&self, distance_mm: f64) -> Option<f64> {
         if distance_mm > self.radius_mm() + REACH_MM {
             return None;

@@ -44,6 +44,7 @@ impl Shape {
 
     /// Height in mm of the cutter's surface above its lowest point at `r_mm` from its axis; None
     /// past the largest radius. A point at distance exactly R is under the cutter.
+    #[inline]
     pub fn height_mm(&self, r_mm: f64) -> Option<f64> {
         let radius = self.radius_mm();
         if r_mm.is_nan() || r_mm > radius {
