@@ -6,6 +6,9 @@ const PAGE: usize = 4096;
 const LINEAR_BITS: u32 = 20;
 /// Every doubling above is cut into 2^(LINEAR_BITS - 1) bins.
 const HALF: u64 = 1 << (LINEAR_BITS - 1);
+const PAST_LINEAR: f64 = (1u64 << LINEAR_BITS) as f64;
+/// Values whose bins are worked out together.
+const TOGETHER: usize = 128;
 /// Past 2^TOP_BITS quanta everything shares the last bin.
 const TOP_BITS: u32 = 40;
 
@@ -28,6 +31,36 @@ impl Histogram {
         }
         self.pages[page].get_or_insert_with(|| vec![0; PAGE].into_boxed_slice())[bin % PAGE] += 1;
         self.count += 1;
+    }
+
+    /// Counts as [`Histogram::add`] does, many at once.
+    pub fn add_all(&mut self, quanta: &[f64]) {
+        let mut bins = [0u32; TOGETHER];
+        for quanta in quanta.chunks(TOGETHER) {
+            for (bin, quanta) in bins.iter_mut().zip(quanta) {
+                // Of what is not a number max and min take the other.
+                *bin = (quanta + 0.5).max(0.0).min(PAST_LINEAR) as i32 as u32;
+            }
+            let mut at = 0;
+            while at < quanta.len() {
+                let page = bins[at] as usize / PAGE;
+                if page >= PAST_LINEAR as usize / PAGE {
+                    self.add(quanta[at]);
+                    at += 1;
+                    continue;
+                }
+                if page >= self.pages.len() {
+                    self.pages.resize(page + 1, None);
+                }
+                let counts = self.pages[page].get_or_insert_with(|| vec![0; PAGE].into_boxed_slice());
+                let first = at;
+                while at < quanta.len() && bins[at] as usize / PAGE == page {
+                    counts[bins[at] as usize % PAGE] += 1;
+                    at += 1;
+                }
+                self.count += (at - first) as u64;
+            }
+        }
     }
 
     /// Takes over everything another one counted.
@@ -106,6 +139,16 @@ mod tests {
             }
         }
         assert_eq!(bin_of(u64::MAX), bin_of((1 << 40) - 1));
+    }
+
+    #[test]
+    fn many_at_once_are_the_same() {
+        let mut values: Vec<f64> = (0..3000).map(|i| f64::from(i * i % 7919) * 211.3).collect();
+        values.extend([f64::NAN, -3.0, 0.5, 1e15, f64::INFINITY, 1_048_575.5, 1_048_576.0]);
+        let (mut one_by_one, mut at_once) = (Histogram::default(), Histogram::default());
+        values.iter().for_each(|value| one_by_one.add(*value));
+        at_once.add_all(&values);
+        assert_eq!(one_by_one, at_once);
     }
 
     #[test]

@@ -5,13 +5,13 @@ use std::ops::Range;
 
 use super::Pixels;
 use super::histogram::Histogram;
-use super::pixels::Line;
+use super::pixels::{Line, total};
 use crate::grid::{Heights, Window};
 
 /// |deviation| is counted in nanometres.
 const DEVIATION_QUANTUM_MM: f64 = 1e-6;
-/// Normals' errors are counted in hundred-thousandths of a degree.
-const ANGLE_QUANTUM_DEG: f64 = 1e-5;
+/// Normals' errors are counted in ten-thousandths of a degree.
+const ANGLE_QUANTUM_DEG: f64 = 1e-4;
 /// Sums are kept in whole 2^-40 mm, so that the order of adding cannot change them.
 pub(super) const SUM_UNITS_PER_MM: f64 = (1u64 << 40) as f64;
 
@@ -103,8 +103,7 @@ pub const CAVITY_THRESHOLD_MM: f64 = 0.001;
 /// Everything counted so far. Tallies of any blocks merge in any order to the same bits.
 ///
 /// Deviation = machined - design. Percentiles of |deviation| are read from a histogram of 1 nm up to 1.05 mm
-/// and of one part in 500,000 above; those of the normals' error from 1e-5 degrees up to 10 degrees, one part in
-/// 500,000 above. Gouge, excess and the part within the limit are exact. No data (NaN or infinite) in design or
+/// and of one part in 500,000 above; those of the normals' error from 1e-4 degrees up. Gouge, excess and the part within the limit are exact. No data (NaN or infinite) in design or
 /// machined leaves a sample out.
 ///
 /// A normal is (-dz/dx, -dz/dy, 1) by central differences at the raster step. Where one neighbour has no data
@@ -188,43 +187,122 @@ impl Tally {
         let machined = part_of_row(layers.machined, block, row);
         let cavity = layers.cavity.map(|heights| part_of_row(heights, block, row));
         let passes = layers.passes.map(|heights| part_of_row(heights, block, row));
-        let [mut gouge_mm, mut excess_mm] =
+        for first in (0..block.columns).step_by(TOGETHER) {
+            let part = first..(first + TOGETHER).min(block.columns);
+            let samples = Samples {
+                first: Place { mm: 0.0, column: block.column + first as i64, row },
+                design: &design[part.clone()],
+                machined: &machined[part.clone()],
+                cavity: cavity.map(|cavity| &cavity[part.clone()]),
+                passes: passes.map(|passes| &passes[part]),
+            };
+            if !self.add_together(&samples) {
+                (0..samples.design.len()).for_each(|k| self.add_sample(&samples, k));
+            }
+        }
+    }
+
+    /// Counts samples that all have data and small figures; false, and nothing counted, if some have not.
+    fn add_together(&mut self, samples: &Samples) -> bool {
+        let count = samples.design.len();
+        let nothing = [0.0; TOGETHER];
+        let (mut deviation_mm, mut quanta, mut units) = (nothing, nothing, nothing);
+        let (mut unreachable, mut rounding) = (nothing, nothing);
+        let mut far = nothing;
+        for k in 0..count {
+            let mm = f64::from(samples.machined[k]) - f64::from(samples.design[k]);
+            deviation_mm[k] = mm;
+            quanta[k] = mm.abs() / DEVIATION_QUANTUM_MM;
+            units[k] = whole(mm * SUM_UNITS_PER_MM);
+            far[k] = mm.abs();
+        }
+        let mut above = 0;
+        let mut deepest_mm = 0.0f32;
+        if let Some(cavity) = samples.cavity {
+            for k in 0..count {
+                let mm = f64::from(cavity[k]);
+                unreachable[k] = whole(mm * SUM_UNITS_PER_MM);
+                far[k] += mm.abs();
+                above += u64::from(mm > CAVITY_THRESHOLD_MM);
+                deepest_mm = if cavity[k] > deepest_mm { cavity[k] } else { deepest_mm };
+            }
+        }
+        if let Some(passes) = samples.passes {
+            for k in 0..count {
+                let mm = f64::from(samples.machined[k]) - f64::from(passes[k]);
+                rounding[k] = whole(mm * SUM_UNITS_PER_MM);
+                far[k] += mm.abs();
+            }
+        }
+        // False where one of them is not a number; below this every sum of units is exact.
+        if !far[..count].iter().all(|mm| *mm < TOGETHER_MM) {
+            return false;
+        }
+        if samples.cavity.is_some() {
+            self.cavity_samples += count as u64;
+            self.cavity_above += above;
+            self.cavity_max_mm = self.cavity_max_mm.max(f64::from(deepest_mm));
+        }
+        self.samples += count as u64;
+        self.deviation.add_all(&quanta[..count]);
+        if let Some(limit) = self.params.limit_mm {
+            let within = deviation_mm[..count].iter().map(|mm| u64::from(mm.abs() <= limit)).sum::<u64>();
+            self.within += within;
+        }
+        let [gouge_mm, excess_mm] =
             [self.gouge, self.excess].map(|place| place.map_or(0.0, |place| place.mm));
-        for i in 0..block.columns {
-            let cavity_mm = cavity.map_or(0.0, |cavity| f64::from(cavity[i]));
-            if cavity.is_some() && cavity_mm.is_finite() {
-                self.cavity_samples += 1;
-                self.cavity_above += u64::from(cavity_mm > CAVITY_THRESHOLD_MM);
-                self.cavity_max_mm = self.cavity_max_mm.max(cavity_mm);
-            }
-            let (design_mm, machined_mm) = (f64::from(design[i]), f64::from(machined[i]));
-            let deviation_mm = machined_mm - design_mm;
-            if !deviation_mm.is_finite() {
-                self.unjudged += u64::from(design_mm.is_finite());
-                continue;
-            }
-            let sum = to_sum(deviation_mm);
-            self.samples += 1;
-            self.deviation_sum += i128::from(sum);
-            self.deviation.add(deviation_mm.abs() / DEVIATION_QUANTUM_MM);
-            self.within += u64::from(self.params.limit_mm.is_some_and(|limit| deviation_mm.abs() <= limit));
-            if deviation_mm <= -gouge_mm || deviation_mm >= excess_mm {
-                self.extreme(
-                    Place { mm: deviation_mm.abs(), column: block.column + i as i64, row },
-                    deviation_mm,
-                );
-                [gouge_mm, excess_mm] =
-                    [self.gouge, self.excess].map(|place| place.map_or(0.0, |place| place.mm));
-            }
-            let rounding_mm = passes.map_or(0.0, |passes| machined_mm - f64::from(passes[i]));
-            if cavity_mm.is_finite() && rounding_mm.is_finite() {
-                let (unreachable, rounding) = (to_sum(cavity_mm), to_sum(rounding_mm));
-                self.cause_samples += 1;
-                self.cause_sums[0] += i128::from(unreachable);
-                // What the other two leave, so that the three add up to the bit.
-                self.cause_sums[1] += i128::from(sum - unreachable - rounding);
-                self.cause_sums[2] += i128::from(rounding);
-            }
+        let extremes = deviation_mm[..count].iter().fold(0u32, |sum, mm| {
+            sum + u32::from(*mm <= -gouge_mm) + u32::from(*mm >= excess_mm)
+        });
+        if extremes > 0 {
+            (0..count).for_each(|k| self.look_at(samples.place(k), deviation_mm[k]));
+        }
+        let [all, unreachable, rounding] =
+            [units, unreachable, rounding].map(|units| i128::from(total(&units) as i64));
+        self.deviation_sum += all;
+        self.cause_samples += count as u64;
+        self.cause_sums[0] += unreachable;
+        self.cause_sums[1] += all - unreachable - rounding;
+        self.cause_sums[2] += rounding;
+        true
+    }
+
+    fn add_sample(&mut self, samples: &Samples, k: usize) {
+        let cavity_mm = samples.cavity.map_or(0.0, |cavity| f64::from(cavity[k]));
+        if samples.cavity.is_some() && cavity_mm.is_finite() {
+            self.cavity_samples += 1;
+            self.cavity_above += u64::from(cavity_mm > CAVITY_THRESHOLD_MM);
+            self.cavity_max_mm = self.cavity_max_mm.max(cavity_mm);
+        }
+        let (design_mm, machined_mm) = (f64::from(samples.design[k]), f64::from(samples.machined[k]));
+        let deviation_mm = machined_mm - design_mm;
+        if !deviation_mm.is_finite() {
+            self.unjudged += u64::from(design_mm.is_finite());
+            return;
+        }
+        let sum = to_sum(deviation_mm);
+        self.samples += 1;
+        self.deviation_sum += i128::from(sum);
+        self.deviation.add(deviation_mm.abs() / DEVIATION_QUANTUM_MM);
+        self.within += u64::from(self.params.limit_mm.is_some_and(|limit| deviation_mm.abs() <= limit));
+        self.look_at(samples.place(k), deviation_mm);
+        let rounding_mm = samples.passes.map_or(0.0, |passes| machined_mm - f64::from(passes[k]));
+        if cavity_mm.is_finite() && rounding_mm.is_finite() {
+            let (unreachable, rounding) = (to_sum(cavity_mm), to_sum(rounding_mm));
+            self.cause_samples += 1;
+            self.cause_sums[0] += i128::from(unreachable);
+            // What the other two leave, so that the three add up to the bit.
+            self.cause_sums[1] += i128::from(sum - unreachable - rounding);
+            self.cause_sums[2] += i128::from(rounding);
+        }
+    }
+
+    /// Keeps the deepest gouge and the largest excess.
+    #[inline(always)]
+    fn look_at(&mut self, place: Place, deviation_mm: f64) {
+        let known = |place: Option<Place>| place.map_or(0.0, |place| place.mm);
+        if deviation_mm <= -known(self.gouge) || deviation_mm >= known(self.excess) {
+            self.extreme(Place { mm: deviation_mm.abs(), ..place }, deviation_mm);
         }
     }
 
@@ -258,18 +336,28 @@ impl Tally {
                 angle_keys(design, machined, 0.5 * per_step, &mut keys[inner]);
             }
         }
-        for (i, &key) in keys.iter().enumerate() {
-            let quick = (0.0..KEY_OF_45_DEG).contains(&key);
-            let Some(key) = (if quick { Some(key) } else { careful_key(&design, &machined, i, per_step) })
-            else {
+        for (start, keys) in (0..).step_by(TOGETHER).zip(keys.chunks(TOGETHER)) {
+            // The tangent is the angle to 1 % up to 10 degrees, and costs nothing.
+            if keys.iter().all(|key| (0.0..SMALL * KEY_OF_45_DEG).contains(key)) {
+                self.normals.add_all(keys);
+                if let Some(line) = line {
+                    let degrees: [f64; TOGETHER] =
+                        std::array::from_fn(|k| keys.get(k).map_or(0.0, |key| key * ANGLE_QUANTUM_DEG));
+                    let weights = &[1.0; TOGETHER][..keys.len()];
+                    line.add_run(block.column + start as i64, weights, &degrees[..keys.len()]);
+                }
                 continue;
-            };
-            self.normals.add(key);
-            if let Some(line) = line {
-                // The tangent is the angle to 1 % up to 10 degrees, and costs nothing.
-                let small = key < 0.17 * KEY_OF_45_DEG;
-                let degrees = if small { key * ANGLE_QUANTUM_DEG } else { angle_of_key(key) };
-                line.add(block.column + i as i64, [1.0, degrees]);
+            }
+            for (k, &key) in keys.iter().enumerate() {
+                let quick = (0.0..KEY_OF_45_DEG).contains(&key);
+                let careful = || careful_key(&design, &machined, start + k, per_step);
+                let Some(key) = (if quick { Some(key) } else { careful() }) else { continue };
+                self.normals.add(key);
+                if let Some(line) = line {
+                    let small = key < SMALL * KEY_OF_45_DEG;
+                    let degrees = if small { key * ANGLE_QUANTUM_DEG } else { angle_of_key(key) };
+                    line.add(block.column + (start + k) as i64, [1.0, degrees]);
+                }
             }
         }
     }
@@ -328,11 +416,38 @@ impl Tally {
     }
 }
 
+/// Samples side by side in every layer.
+struct Samples<'a> {
+    first: Place,
+    design: &'a [f32],
+    machined: &'a [f32],
+    cavity: Option<&'a [f32]>,
+    passes: Option<&'a [f32]>,
+}
+
+impl Samples<'_> {
+    fn place(&self, k: usize) -> Place {
+        Place { column: self.first.column + k as i64, ..self.first }
+    }
+}
+
+/// Samples that are counted together.
+const TOGETHER: usize = 128;
+
+/// Sums of so many figures below this, in the sums' units, are exact in a double.
+const TOGETHER_MM: f64 = 16.0;
+
+/// The nearest whole number, the even one of two, up to 2^51: plain x86-64 has no instruction for it.
+fn whole(units: f64) -> f64 {
+    const SHIFT: f64 = (3u64 << 51) as f64;
+    (units + SHIFT) - SHIFT
+}
+
 /// Rounded to the sums' unit; differences of real surfaces are far below the 8 km at which this saturates.
 pub(super) fn to_sum(mm: f64) -> i64 {
     let units = mm * SUM_UNITS_PER_MM;
-    // f64::round is a call on plain x86-64, and this runs three times a sample.
-    (units + 0.5f64.copysign(units)) as i64
+    // Past 2^51 units, 2 m, what is left of one does not matter.
+    if units.abs() < (1u64 << 51) as f64 { whole(units) as i64 } else { units as i64 }
 }
 
 pub(super) fn covers(layer: &'static str, heights: &Heights, block: Window) -> Result<(), super::Error> {
@@ -452,6 +567,9 @@ fn cross_and_dot([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> (f64, f64) {
     let (u, v, w) = (ax - bx, ay - by, ax * by - ay * bx);
     ((u * u + v * v + w * w).sqrt(), ax * bx + ay * by + 1.0)
 }
+
+/// Tangent up to which it stands for the angle in a picture.
+const SMALL: f64 = 0.17;
 
 /// Below 45 degrees a key is the tangent in units of the angle's quantum, which needs no arc tangent; above, it
 /// grows by the rest of the angle.

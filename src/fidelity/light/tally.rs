@@ -6,7 +6,7 @@ use super::metal::draw;
 use super::row::Chunk;
 use super::view::{BINS, bin_of};
 use super::{End, Pose, Relief, Room, Stage, View};
-use crate::fidelity::pixels::{Line, Pixels};
+use crate::fidelity::pixels::{Line, Pixels, total};
 use crate::grid::{Heights, Window};
 
 /// Bounces that are followed; light that has not left by then is unresolved.
@@ -22,7 +22,7 @@ const FINE: usize = ROOM_BINS / BINS;
 const FILLED: f64 = 0.25;
 
 /// Rows per task; a constant, so that it is no part of how sums come about.
-const BAND_ROWS: usize = 64;
+const BAND_ROWS: usize = 256;
 
 /// Shares of the incident light; they sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -179,24 +179,43 @@ impl LightTally {
         count: usize,
         line: &mut Option<Line>,
     ) {
+        let nothing = [0.0; Chunk::SAMPLES];
+        let (mut taken, mut reflected, mut arrived) = (nothing, nothing, nothing);
+        let mut done = 0;
         for k in 0..count {
-            let light = if chunk.done[k] {
-                let (taken, reflected, bin) = (chunk.taken[k], chunk.reflected[k], chunk.bin[k] as usize);
-                self.samples += 1;
-                self.incident += taken;
-                self.absorbed += taken - reflected;
-                let met = chunk.met[k] >= 0.0;
-                let arrived = if met { reflected } else { 0.0 };
-                self.on_audience += arrived;
-                self.leak += reflected - arrived;
-                self.room[bin] += reflected;
-                self.met[bin] += arrived;
-                [taken, arrived]
-            } else {
-                self.sample(ground, relief, stage, column + k as i64, row)
-            };
-            if let Some(line) = line {
-                line.add(column + k as i64, light);
+            let on = chunk.done[k];
+            done += usize::from(on);
+            taken[k] = if on { chunk.taken[k] } else { 0.0 };
+            reflected[k] = if on { chunk.reflected[k] } else { 0.0 };
+            arrived[k] = if chunk.met[k] >= 0.0 { reflected[k] } else { 0.0 };
+        }
+        let [taken, reflected, arrived] = [&taken[..count], &reflected[..count], &arrived[..count]];
+        let [all, left, met] = [taken, reflected, arrived].map(total);
+        self.samples += done as u64;
+        self.incident += all;
+        self.absorbed += all - left;
+        self.on_audience += met;
+        self.leak += left - met;
+        // On one facet all light goes one way.
+        let mut k = 0;
+        while k < count {
+            let bin = chunk.bin[k];
+            let (mut left, mut met) = (0.0, 0.0);
+            while k < count && chunk.bin[k] == bin {
+                left += reflected[k];
+                met += arrived[k];
+                k += 1;
+            }
+            self.room[bin as usize] += left;
+            self.met[bin as usize] += met;
+        }
+        if let Some(line) = line {
+            line.add_run(column, taken, arrived);
+        }
+        if done < count {
+            for k in (0..count).filter(|k| !chunk.done[*k]) {
+                let light = self.sample(ground, relief, stage, column + k as i64, row);
+                line.iter_mut().for_each(|line| line.add(column + k as i64, light));
             }
         }
     }
