@@ -80,6 +80,14 @@ impl Window {
         self.row + self.rows as i64
     }
 
+    /// The smallest window that holds both.
+    pub fn hull(&self, other: &Window) -> Window {
+        let (column, row) = (self.column.min(other.column), self.row.min(other.row));
+        let (column_end, row_end) =
+            (self.column_end().max(other.column_end()), self.row_end().max(other.row_end()));
+        Window { column, row, columns: (column_end - column) as usize, rows: (row_end - row) as usize }
+    }
+
     /// What both windows cover, or None.
     pub fn intersection(&self, other: &Window) -> Option<Window> {
         let column = self.column.max(other.column);

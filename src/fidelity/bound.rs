@@ -39,8 +39,8 @@ impl Peaks {
     }
 
     /// Where a cutter's closing could be lower than `lowest`, a closing of `design` in the same window: windows that
-    /// hold all such samples. The heights looked over should reach as far around as those that the closing would be
-    /// made from.
+    /// hold all such samples, as few as are together less work to close. The heights looked over should reach as far
+    /// around as those that the closing would be made from.
     pub fn lower_within(
         &self,
         shape: &Shape,
@@ -61,42 +61,53 @@ impl Peaks {
                 found.extend(lower(&least, piece, lowest, design));
             }
         }
-        found
+        together(found, (shape.radius_mm() / step_mm).ceil() as usize)
     }
 
     /// The lowest that the cutter could stand at any sample of each block.
     fn standing(&self, shape: &Shape, step_mm: f64, out: Window, reach: i64) -> Heights {
         let mut standing = Heights { window: out, z_mm: vec![f32::NEG_INFINITY; out.samples()] };
-        each_offset(
-            shape,
-            step_mm,
-            reach,
-            |blocks| blocks * BLOCK + BLOCK - 1,
-            |[across, up], rise| {
-                for row in out.row..out.row_end() {
-                    let from = row + up;
-                    if from < self.blocks.row || from >= self.blocks.row_end() {
-                        continue;
-                    }
-                    let first = out.column.max(self.blocks.column - across);
-                    let end = out.column_end().min(self.blocks.column_end() - across);
-                    if first >= end {
-                        continue;
-                    }
-                    let count = (end - first) as usize;
-                    let to = (row - out.row) as usize * out.columns + (first - out.column) as usize;
-                    let at = (from - self.blocks.row) as usize * self.blocks.columns
-                        + (first + across - self.blocks.column) as usize;
-                    for (z, peak) in standing.z_mm[to..to + count].iter_mut().zip(&self.z_mm[at..at + count])
-                    {
-                        let stands = peak - rise;
-                        *z = if stands > *z { stands } else { *z };
-                    }
+        let offsets = offsets(shape, step_mm, reach, |blocks| blocks * BLOCK + BLOCK - 1);
+        for row in out.row..out.row_end() {
+            for &([across, up], rise) in &offsets {
+                let from = row + up;
+                if from < self.blocks.row || from >= self.blocks.row_end() {
+                    continue;
                 }
-            },
-        );
+                let first = out.column.max(self.blocks.column - across);
+                let end = out.column_end().min(self.blocks.column_end() - across);
+                if first >= end {
+                    continue;
+                }
+                let count = (end - first) as usize;
+                let to = (row - out.row) as usize * out.columns + (first - out.column) as usize;
+                let at = (from - self.blocks.row) as usize * self.blocks.columns
+                    + (first + across - self.blocks.column) as usize;
+                raise(&mut standing.z_mm[to..to + count], &self.z_mm[at..at + count], rise);
+            }
+        }
         standing
     }
+}
+
+/// Windows that cover these, in which closing takes less work: each is closed with `reach` samples around it.
+fn together(mut windows: Vec<Window>, reach: usize) -> Vec<Window> {
+    let work = |window: &Window| window.grown(reach).samples();
+    let mut at = 0;
+    while at < windows.len() {
+        let one = windows[at];
+        let other = (0..windows.len())
+            .find(|&k| k != at && work(&one.hull(&windows[k])) <= work(&one) + work(&windows[k]));
+        match other {
+            Some(other) => {
+                windows[at] = one.hull(&windows[other]);
+                windows.remove(other);
+                at = 0;
+            }
+            None => at += 1,
+        }
+    }
+    windows
 }
 
 /// The samples of some blocks at which `lowest` stands above both the design and the least of its block.
@@ -139,39 +150,61 @@ fn lower(least: &Heights, blocks: Window, lowest: &Heights, design: &Heights) ->
 fn eroded(shape: &Shape, step_mm: f64, standing: &Heights, out: Window, reach: i64) -> Heights {
     let mut least = Heights { window: out, z_mm: vec![f32::INFINITY; out.samples()] };
     let from = standing.window;
-    each_offset(
-        shape,
-        step_mm,
-        reach,
-        |blocks| (blocks * BLOCK - BLOCK + 1).max(0),
-        |[across, up], rise| {
-            for row in out.row..out.row_end() {
-                let to = (row - out.row) as usize * out.columns;
-                let at = (row + up - from.row) as usize * from.columns
-                    + (out.column + across - from.column) as usize;
-                for (z, stands) in
-                    least.z_mm[to..to + out.columns].iter_mut().zip(&standing.z_mm[at..at + out.columns])
-                {
-                    let left = stands + rise;
-                    *z = if left < *z { left } else { *z };
-                }
-            }
-        },
-    );
+    let offsets = offsets(shape, step_mm, reach, |blocks| (blocks * BLOCK - BLOCK + 1).max(0));
+    for row in out.row..out.row_end() {
+        let to = (row - out.row) as usize * out.columns;
+        for &([across, up], rise) in &offsets {
+            let at =
+                (row + up - from.row) as usize * from.columns + (out.column + across - from.column) as usize;
+            lower_by(&mut least.z_mm[to..to + out.columns], &standing.z_mm[at..at + out.columns], rise);
+        }
+    }
     least
+}
+
+/// z = max(z, from - by).
+fn raise(z: &mut [f32], from: &[f32], by: f32) {
+    wide(z, from, |z, from| {
+        for (z, from) in z.iter_mut().zip(from) {
+            let stands = from - by;
+            *z = if stands > *z { stands } else { *z };
+        }
+    });
+}
+
+/// z = min(z, from + by).
+fn lower_by(z: &mut [f32], from: &[f32], by: f32) {
+    wide(z, from, |z, from| {
+        for (z, from) in z.iter_mut().zip(from) {
+            let left = from + by;
+            *z = if left < *z { left } else { *z };
+        }
+    });
+}
+
+/// Runs a loop over two rows, compiled for vectors of 256 bits where the processor has them.
+#[inline(always)]
+fn wide(z: &mut [f32], from: &[f32], body: impl Fn(&mut [f32], &[f32])) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2(z: &mut [f32], from: &[f32], body: impl Fn(&mut [f32], &[f32])) {
+            body(z, from);
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the feature was found on this processor.
+            return unsafe { avx2(z, from, body) };
+        }
+    }
+    body(z, from);
 }
 
 /// Every offset between blocks within the cutter, and the cutter's rise there, less or more its rounding; `samples`
 /// gives the distance along an axis that counts for blocks so far apart.
-fn each_offset(
-    shape: &Shape,
-    step_mm: f64,
-    reach: i64,
-    samples: impl Fn(i64) -> i64,
-    mut each: impl FnMut([i64; 2], f32),
-) {
+fn offsets(shape: &Shape, step_mm: f64, reach: i64, samples: impl Fn(i64) -> i64) -> Vec<([i64; 2], f32)> {
     // Of the samples' distances the nearest counts with the lower rise, the farthest with the higher.
     let nearest = samples(0) == 0;
+    let mut out = Vec::new();
     for up in -reach..=reach {
         for across in -reach..=reach {
             let [x, y] = [across, up].map(|blocks| samples(blocks.abs()) as f64 * step_mm);
@@ -179,9 +212,10 @@ fn each_offset(
             let inside = if nearest { r_mm - 1e-9 } else { r_mm + 1e-9 };
             let Some(rise) = shape.height_mm(inside.max(0.0)) else { continue };
             let rounded = if rise == 0.0 { 0.0 } else { ROUNDED_MM };
-            each([across, up], (if nearest { rise - rounded } else { rise + rounded }) as f32);
+            out.push(([across, up], (if nearest { rise - rounded } else { rise + rounded }) as f32));
         }
     }
+    out
 }
 
 /// The blocks that a window touches.

@@ -251,9 +251,9 @@ impl Tally {
         }
         let [gouge_mm, excess_mm] =
             [self.gouge, self.excess].map(|place| place.map_or(0.0, |place| place.mm));
-        let extremes = deviation_mm[..count].iter().fold(0u32, |sum, mm| {
-            sum + u32::from(*mm <= -gouge_mm) + u32::from(*mm >= excess_mm)
-        });
+        let extremes = deviation_mm[..count]
+            .iter()
+            .fold(0u32, |sum, mm| sum + u32::from(*mm <= -gouge_mm) + u32::from(*mm >= excess_mm));
         if extremes > 0 {
             (0..count).for_each(|k| self.look_at(samples.place(k), deviation_mm[k]));
         }
