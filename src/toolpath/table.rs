@@ -8,28 +8,34 @@ use super::funnel::Vertex;
 /// A cost that nothing undercuts, for positions without such a state.
 const ABSENT: f64 = f64::NEG_INFINITY;
 
-/// One grid point between the bounds of each position, and the cheapest way to it.
-struct Layer {
-    z: Vec<f64>,
-    cost: Vec<f64>,
-    /// Position and layer that the way comes from: position times the layers, and the layer.
-    from: Vec<u32>,
+/// Eight positions.
+#[derive(Clone)]
+struct Positions {
+    low: [f64; EIGHT],
+    high: [f64; EIGHT],
+    exact: [f64; EIGHT],
+    w: [f64; EIGHT],
+    /// Sums up to and with each position, of w, w g and w g^2 for the slope g that leads to it.
+    sums: [[f64; EIGHT]; 3],
 }
 
-/// Grid points between the bounds of positions in a row. Every list runs on past the last position for as long as
-/// a group may.
+/// One grid point between the bounds of each of eight positions, and the cheapest way to it.
+#[derive(Clone)]
+struct Points {
+    z: [f64; EIGHT],
+    cost: [f64; EIGHT],
+    /// Position and layer that the way comes from: position times the layers, and the layer.
+    from: [u32; EIGHT],
+}
+
+/// Grid points between the bounds of positions in a row, in groups of eight; the last group may run past the end.
 pub(super) struct Table {
     count: usize,
-    low: Vec<f64>,
-    high: Vec<f64>,
-    exact: Vec<f64>,
-    w: Vec<f64>,
-    /// Sums up to and with each position, of w, w g and w g^2 for the slope g that leads to it.
-    sums: [Vec<f64>; 3],
+    positions: Vec<Positions>,
     /// 1 over the distance in positions, which is less [`EIGHT`] than the index; 0 up to there.
     part: Vec<f64>,
     /// The lowest points of all positions, the second lowest, and so on.
-    layers: Vec<Layer>,
+    layers: Vec<Vec<Points>>,
     block: f64,
     slope_cost: f64,
     height_cost: f64,
@@ -39,33 +45,20 @@ impl Table {
     /// Bounds and exact heights in units; none of them empty.
     pub(super) fn new(low: &[f64], high: &[f64], exact: &[f64], measure: &Measure) -> Table {
         let count = low.len();
-        let held = count + EIGHT;
-        let padded = |values: &[f64], with: f64| {
-            let mut all = Vec::with_capacity(held);
-            all.extend_from_slice(values);
-            all.resize(held, with);
-            all
+        let groups = count.div_ceil(EIGHT);
+        let weights = weights(exact, measure);
+        // Past the end no line is between the bounds.
+        let end = Positions {
+            low: [f64::INFINITY; EIGHT],
+            high: [f64::NEG_INFINITY; EIGHT],
+            exact: [0.0; EIGHT],
+            w: [0.0; EIGHT],
+            sums: [[0.0; EIGHT]; 3],
         };
-        let w = weights(exact, measure);
-        let mut sums = [0, 1, 2].map(|_| Vec::with_capacity(held));
-        let mut sum = [0.0; 3];
-        for (i, w) in w.iter().enumerate() {
-            let g = if i == 0 { 0.0 } else { exact[i] - exact[i - 1] };
-            for (k, term) in [*w, w * g, w * g * g].into_iter().enumerate() {
-                sum[k] += term;
-                sums[k].push(sum[k]);
-            }
-        }
-        sums.iter_mut().zip(sum).for_each(|(sums, sum)| sums.resize(held, sum));
         let mut table = Table {
             count,
-            // Past the end no line is between the bounds.
-            low: padded(low, f64::INFINITY),
-            high: padded(high, f64::NEG_INFINITY),
-            exact: padded(exact, 0.0),
-            w: padded(&w, 0.0),
-            sums,
-            part: (0..=held + EIGHT)
+            positions: vec![end; groups],
+            part: (0..=(groups + 1) * EIGHT)
                 .map(|i| if i > EIGHT { 1.0 / (i - EIGHT) as f64 } else { 0.0 })
                 .collect(),
             layers: Vec::new(),
@@ -73,19 +66,26 @@ impl Table {
             slope_cost: (measure.unit_mm / measure.pitch_mm).powi(2),
             height_cost: FLANKS * (measure.unit_mm / measure.stepover_mm).powi(2),
         };
+        let mut sum = [0.0; 3];
         for i in 0..count {
+            let (group, lane) = (i / EIGHT, i % EIGHT);
+            let w = weights[i];
+            let g = if i == 0 { 0.0 } else { exact[i] - exact[i - 1] };
+            let to = &mut table.positions[group];
+            (to.low[lane], to.high[lane], to.exact[lane], to.w[lane]) = (low[i], high[i], exact[i], w);
+            for (k, term) in [w, w * g, w * g * g].into_iter().enumerate() {
+                sum[k] += term;
+                to.sums[k][lane] = sum[k];
+            }
             let first = low[i].ceil();
             let states = (high[i].floor() - first).max(0.0) as usize + 1;
             while table.layers.len() < states {
-                table.layers.push(Layer {
-                    z: vec![0.0; held],
-                    cost: vec![ABSENT; held],
-                    from: vec![0; held],
-                });
+                let none = Points { z: [0.0; EIGHT], cost: [ABSENT; EIGHT], from: [0; EIGHT] };
+                table.layers.push(vec![none; groups]);
             }
             for (nth, layer) in table.layers[..states].iter_mut().enumerate() {
-                layer.z[i] = first + nth as f64;
-                layer.cost[i] = if i == 0 { 0.0 } else { f64::INFINITY };
+                layer[group].z[lane] = first + nth as f64;
+                layer[group].cost[lane] = if i == 0 { 0.0 } else { f64::INFINITY };
             }
         }
         table
@@ -124,7 +124,7 @@ impl Table {
     fn fill_with<E: Eight>(&mut self) {
         for i in 0..self.count.saturating_sub(1) {
             for nth in 0..self.layers.len() {
-                if self.layers[nth].cost[i].is_finite() {
+                if self.layers[nth][i / EIGHT].cost[i % EIGHT].is_finite() {
                     self.moves_from::<E>(i, nth);
                 }
             }
@@ -135,60 +135,62 @@ impl Table {
     #[inline(always)]
     fn moves_from<E: Eight>(&mut self, i: usize, nth: usize) {
         let from = (i * self.layers.len() + nth) as u32;
-        let z = E::splat(self.layers[nth].z[i]);
+        let (group, lane) = (i / EIGHT, i % EIGHT);
+        let origin = &self.layers[nth][group];
+        let z = E::splat(origin.z[lane]);
         // No move from here costs less than this.
-        let at_least = E::splat(self.layers[nth].cost[i] + self.block);
-        let [sum_w, sum_wg, sum_wg2] = &self.sums;
-        let before = [E::splat(sum_w[i]), E::splat(sum_wg[i]), E::splat(sum_wg2[i])];
+        let at_least = E::splat(origin.cost[lane] + self.block);
+        let [sum_w, sum_wg, sum_wg2] = self.positions[group].sums;
+        let before = [E::splat(sum_w[lane]), E::splat(sum_wg[lane]), E::splat(sum_wg2[lane])];
         let (slope_cost, height_cost) = (E::splat(self.slope_cost), E::splat(self.height_cost));
         let (zero, eight) = (E::splat(0.0), E::splat(EIGHT as f64));
         let (none, all) = (E::splat(f64::NEG_INFINITY), E::splat(f64::INFINITY));
         let (mut least, mut most) = (none, all);
         // Over the positions passed, d away and q above the point: w d^2, w d q, w q^2.
         let mut behind = [zero; 3];
-        // Groups begin at multiples of eight, so that costs are read as they were written.
-        let start = (i + 1) / EIGHT * EIGHT;
-        let mut later = u8::MAX << (i + 1 - start);
-        let mut d =
-            E::add(E::load(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]), E::splat(start as f64 - i as f64));
-        for first in (start..self.count).step_by(EIGHT) {
-            let part = E::load(eight_of(&self.part, EIGHT + first - i));
-            let w = E::choose(later, E::load(eight_of(&self.w, first)), zero);
-            let q = E::subtract(E::load(eight_of(&self.exact, first)), z);
+        // The first group may hold the point itself and some before it.
+        let start = (i + 1) / EIGHT;
+        let mut later = u8::MAX << ((i + 1) % EIGHT);
+        let mut d = E::add(
+            E::load(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]),
+            E::splat((start * EIGHT) as f64 - i as f64),
+        );
+        let parts = &self.part[(start + 1) * EIGHT - i..];
+        let groups = self.positions[start..].iter().zip(parts.chunks_exact(EIGHT)).enumerate();
+        for (k, (positions, part)) in groups {
+            let Some(part) = part.first_chunk::<EIGHT>() else { return };
+            let part = E::load(part);
+            let w = E::choose(later, E::load(&positions.w), zero);
+            let q = E::subtract(E::load(&positions.exact), z);
             let (wd, wq) = (E::multiply(w, d), E::multiply(w, q));
             let wd2 = E::add(sums::<E>(E::multiply(wd, d)), behind[0]);
             let wdq = E::add(sums::<E>(E::multiply(wd, q)), behind[1]);
             let wq2 = E::add(sums::<E>(E::multiply(wq, q)), behind[2]);
-            let w = E::subtract(E::load(eight_of(sum_w, first)), before[0]);
-            let wg = E::subtract(E::load(eight_of(sum_wg, first)), before[1]);
-            let wg2 = E::subtract(E::load(eight_of(sum_wg2, first)), before[2]);
-            let low = E::multiply(E::subtract(E::load(eight_of(&self.low, first)), z), part);
-            let high = E::multiply(E::subtract(E::load(eight_of(&self.high, first)), z), part);
+            let [w, wg, wg2] = &positions.sums;
+            let w = E::subtract(E::load(w), before[0]);
+            let wg = E::subtract(E::load(wg), before[1]);
+            let wg2 = E::subtract(E::load(wg2), before[2]);
+            let low = E::multiply(E::subtract(E::load(&positions.low), z), part);
+            let high = E::multiply(E::subtract(E::load(&positions.high), z), part);
             let (low, high) = (E::choose(later, low, none), E::choose(later, high, all));
             let (low, high) = (E::greater(greatest::<E>(low), least), E::less(least_of::<E>(high), most));
             // The bounds of the positions before each.
             let (over, under) = (E::after(low, least), E::after(high, most));
             for layer in &mut self.layers {
-                let Some(cost) = layer.cost[first..].first_chunk_mut::<EIGHT>() else { return };
-                let old = E::load(cost);
+                let points = &mut layer[start + k];
+                let old = E::load(&points.cost);
                 let open = later & E::is_less(at_least, old);
                 if open == 0 {
                     continue;
                 }
-                let s = E::multiply(E::subtract(E::load(eight_of(&layer.z, first)), z), part);
+                let s = E::multiply(E::subtract(E::load(&points.z), z), part);
                 let meant = open & !E::is_less(s, over) & !E::is_less(under, s);
-                if meant == 0 {
-                    continue;
-                }
                 let turned = E::multiply(slope_cost, squares::<E>(s, w, wg, wg2));
                 let raised = E::multiply(height_cost, squares::<E>(s, wd2, wdq, wq2));
                 let new = E::add(E::add(at_least, turned), raised);
                 let better = meant & E::is_less(new, old);
-                if better != 0 {
-                    E::store(E::choose(better, new, old), cost);
-                    let Some(to) = layer.from[first..].first_chunk_mut::<EIGHT>() else { return };
-                    E::mark(to, better, from);
-                }
+                E::store(E::choose(better, new, old), &mut points.cost);
+                E::mark(&mut points.from, better, from);
             }
             (least, most) = (E::last(low), E::last(high));
             if E::is_less(most, least) != 0 {
@@ -204,29 +206,27 @@ impl Table {
     pub(super) fn best(&self) -> Vec<Vertex> {
         let layers = self.layers.len();
         let last = self.count - 1;
-        let reached = |nth: &usize| self.layers[*nth].cost[last] != ABSENT;
-        let cost = |nth: usize| self.layers[nth].cost[last];
-        let best = (0..layers).filter(reached).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0);
+        let at = |nth: usize, i: usize| (&self.layers[nth][i / EIGHT], i % EIGHT);
+        let cost = |nth: usize| {
+            let (points, lane) = at(nth, last);
+            points.cost[lane]
+        };
+        let reached = (0..layers).filter(|nth| cost(*nth) != ABSENT);
+        let best = reached.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0);
         let mut out = Vec::new();
-        let mut at = (last, best);
+        let (mut i, mut nth) = (last, best);
         loop {
-            let layer = &self.layers[at.1];
-            out.push((at.0, layer.z[at.0] as i32));
-            if at.0 == 0 {
+            let (points, lane) = at(nth, i);
+            out.push((i, points.z[lane] as i32));
+            if i == 0 {
                 break;
             }
-            let from = layer.from[at.0] as usize;
-            at = (from / layers, from % layers);
+            let from = points.from[lane] as usize;
+            (i, nth) = (from / layers, from % layers);
         }
         out.reverse();
         out
     }
-}
-
-/// Eight of a list, which is long enough.
-#[inline(always)]
-fn eight_of(list: &[f64], first: usize) -> &[f64; EIGHT] {
-    list[first..].first_chunk::<EIGHT>().unwrap_or(&[0.0; EIGHT])
 }
 
 /// s^2 a - 2 s b + c, which is a sum of squares.
@@ -284,7 +284,7 @@ mod tests {
             widest.fill();
             let mut portable = Table::new(&low, &high, &exact, &MEASURE);
             portable.fill_with::<Portable>();
-            for (a, b) in widest.layers.iter().zip(&portable.layers) {
+            for (a, b) in widest.layers.iter().flatten().zip(portable.layers.iter().flatten()) {
                 prop_assert!(a.cost.iter().zip(&b.cost).all(|(a, b)| a.to_bits() == b.to_bits()));
             }
             prop_assert_eq!(widest.best(), portable.best());
