@@ -135,17 +135,19 @@ fn work(chunk: &mut Chunk, rows: &[&[f32]; 5], about: &About, outlines: &[&[[DVe
         let (ix, iy, iz) = (p.x - px, p.y - py, p.z - pz);
         let dot = iz - ix * zx - iy * zy;
         let n2 = 1.0 + zx * zx + zy * zy;
-        let length = (ix * ix + iy * iy + iz * iz).sqrt();
-        let falls = dot / length;
-        let cos = falls / n2.sqrt();
+        // Roots and quotients are what takes the time here: |i| and |N| by one quotient.
+        let (length, n1) = ((ix * ix + iy * iy + iz * iz).sqrt(), n2.sqrt());
+        let per = 1.0 / (length * n1);
+        let cos = dot * per;
+        let falls = cos * n1;
         // The conductor's reflectance, as in `ComplexIndex::reflectance`.
         let (cos2, sin2) = (cos * cos, 1.0 - cos * cos);
         let t = nk - sin2;
         let a2b2 = (t * t + nk4).sqrt();
         let ac = 2.0 * (0.5 * (a2b2 + t)).sqrt() * cos;
-        let s = (a2b2 + cos2 - ac) / (a2b2 + cos2 + ac);
+        // s (1 + (u - v) / (u + v)) / 2 with s = (a^2 + b^2 + cos^2 - ac) / (a^2 + b^2 + cos^2 + ac).
         let (u, v) = (cos2 * a2b2 + sin2 * sin2, ac * sin2);
-        let reflectance = 0.5 * s * (1.0 + (u - v) / (u + v));
+        let reflectance = (a2b2 + cos2 - ac) * u / ((a2b2 + cos2 + ac) * (u + v));
         // The mirrored ray, |N|^2 |i| long.
         let (x, y, z) = (-2.0 * dot * zx - n2 * ix, -2.0 * dot * zy - n2 * iy, 2.0 * dot - n2 * iz);
         let (flat2, clear) = (x * x + y * y, clear2[at]);
@@ -158,7 +160,7 @@ fn work(chunk: &mut Chunk, rows: &[&[f32]; 5], about: &About, outlines: &[&[[DVe
         qx[at] = y * pz - z * py;
         qy[at] = z * px - x * pz;
         qz[at] = x * py - y * px;
-        let unit = half / (n2 * length);
+        let unit = half * per * (per * length);
         let across = (turned.x_axis.x * x + turned.y_axis.x * y + turned.z_axis.x * z) * unit + half;
         let up = (turned.x_axis.y * x + turned.y_axis.y * y + turned.z_axis.y * z) * unit + half;
         let last = (ROOM_BINS - 1) as f64;
