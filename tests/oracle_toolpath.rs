@@ -228,6 +228,7 @@ fn rough_params(cutter: &str) -> rough::Params {
         stock_to_leave_mm: 0.05,
         direction_deg: 0.0,
         pattern: Pattern::Zigzag,
+        ramp_slope: f64::INFINITY,
         clear_mm: 0.3,
     }
 }
@@ -241,7 +242,8 @@ fn roughing_bites_no_deeper_than_its_stepdown_and_leaves_what_it_should() {
             let unit_mm = [0.0001, 0.001, 0.01][nth % 3];
             let direction_deg = [0.0, 90.0][nth % 2];
             let site = site(&relief, unit_mm, 0.0);
-            let params = rough::Params { direction_deg, ..rough_params(cutter) };
+            let ramp_slope = [f64::INFINITY, 0.1][nth / 2 % 2];
+            let params = rough::Params { direction_deg, ramp_slope, ..rough_params(cutter) };
             let path = rough::rough(&site, &params, &|_| ()).unwrap();
             assert_rules(&site, &path);
             let mut stock = Stock::blank(&site);
@@ -251,6 +253,31 @@ fn roughing_bites_no_deeper_than_its_stepdown_and_leaves_what_it_should() {
             assert!(least >= 0.05 - GOUGE - FLOAT, "{case}: leaves {least}");
             assert_eq!(cut.deepest_rapid_mm, 0.0, "{case}");
             assert!(cut.deepest_bite_mm <= 0.15 + 1e-9, "{case}: bites {}", cut.deepest_bite_mm);
+        }
+    }
+}
+
+/// Down along the cut, and from row to row from the side, instead of into the metal from above.
+#[test]
+fn roughing_ramps_into_the_metal() {
+    for (name, relief) in surfaces().into_iter().take(5) {
+        let site = site(&relief, 0.001, 0.0);
+        let cut = |ramp_slope: f64, pattern: Pattern| {
+            let params = rough::Params { ramp_slope, pattern, ..rough_params("flat:0.2") };
+            let mut stock = Stock::blank(&site);
+            let path = rough::rough(&site, &params, &|_| ()).unwrap();
+            (stock.cut(&site, params.shape, &path, 0.02, 0.0), stock)
+        };
+        for pattern in [Pattern::Zigzag, Pattern::OneWay] {
+            let (straight, first) = cut(f64::INFINITY, pattern);
+            let (ramped, second) = cut(0.2, pattern);
+            assert!((straight.deepest_plunge_mm - 0.15).abs() < 1e-3, "{name}: {straight:?}");
+            assert!(
+                ramped.deepest_plunge_mm < 0.05 && ramped.deepest_bite_mm <= 0.15 + 1e-9,
+                "{name}: {ramped:?}"
+            );
+            // The cut comes after its ramp, so nothing stays that would not stay without.
+            assert!(first.z_mm.iter().zip(&second.z_mm).all(|(a, b)| *b <= a + 1e-9), "{name}");
         }
     }
 }

@@ -81,6 +81,7 @@ fn rough_params() -> rough::Params {
         stock_to_leave_mm: 0.05,
         direction_deg: 0.0,
         pattern: Pattern::Zigzag,
+        ramp_slope: f64::INFINITY,
         clear_mm: 0.2,
     }
 }

@@ -58,6 +58,7 @@ fn passes_along_y_are_passes_along_x_of_the_transposed_part() {
         stock_to_leave_mm: 0.0625,
         direction_deg,
         pattern: Pattern::Zigzag,
+        ramp_slope: f64::INFINITY,
         clear_mm: 0.25,
     };
     let along_x = rough::rough(&site(&part, UNIT, 0.0), &clear(0.0), &|_| ()).unwrap();

@@ -22,6 +22,8 @@ pub struct Operation {
     pub direction_deg: f64,
     #[serde(default)]
     pub pattern: Pattern,
+    /// How steeply roughing goes down into solid metal; 90 is straight down.
+    pub ramp_deg: Option<f64>,
     pub feed_mm_min: Option<f64>,
     pub plunge_mm_min: Option<f64>,
     pub spindle_rpm: Option<f64>,
@@ -136,6 +138,7 @@ impl Operation {
             ("leftover_mm", self.leftover_mm, 1e-4, 10.0),
             ("stock_to_leave_mm", Some(self.stock_to_leave_mm), 0.0, 10.0),
             ("direction_deg", Some(self.direction_deg), -360.0, 360.0),
+            ("ramp_deg", self.ramp_deg, 0.5, 90.0),
             ("feed_mm_min", self.feed_mm_min, 1.0, 60_000.0),
             ("plunge_mm_min", self.plunge_mm_min, 1.0, 60_000.0),
             ("spindle_rpm", self.spindle_rpm, 1.0, 200_000.0),
@@ -199,6 +202,7 @@ impl Operation {
             ("has leftover_mm", out, self.leftover_mm.is_some(), &[Rest]),
             ("has stock_to_leave_mm", out, self.stock_to_leave_mm > 0.0, &[Rough, Finish]),
             ("has direction_deg", out, self.direction_deg != 0.0, &[Rough, Finish, Rest]),
+            ("has ramp_deg", out, self.ramp_deg.is_some(), &[Rough]),
             ("has pattern = \"one-way\"", out, self.pattern == Pattern::OneWay, &[Rough, Finish, Rest]),
             ("has face = \"underside\"", out, self.face == Face::Underside, &[Drill, Mark]),
             ("has depth_mm", out, self.depth_mm.is_some(), &[Drill, Mark]),
@@ -258,6 +262,11 @@ impl Operation {
     /// What the cutters before may leave where a rest operation does not go, in mm.
     pub fn leftover_or_default_mm(&self) -> f64 {
         self.leftover_mm.unwrap_or(0.005)
+    }
+
+    /// How steeply roughing goes down into solid metal, in degrees.
+    pub fn ramp_or_default_deg(&self) -> f64 {
+        self.ramp_deg.unwrap_or(3.0)
     }
 
     /// Whether it leaves the part's surface as it is to be.

@@ -257,6 +257,7 @@ pub fn programs(
                     stock_to_leave_mm: operation.stock_to_leave_mm,
                     direction_deg: operation.direction_deg,
                     pattern: pattern(operation),
+                    ramp_slope: ramp_slope(operation, tool),
                     clear_mm,
                 };
                 rough::rough(&site, &params, &tell).map_err(refused)?
@@ -311,6 +312,14 @@ fn stay_mm(shop: &Shop, tool: &Tool, height_mm: f64) -> f64 {
     let rate = &shop.machine.rate;
     let minutes = 2.0 * height_mm / rate.rapid_z_mm_min + toolpath::APPROACH_MM / tool.plunge_mm_min;
     tool.feed_mm_min * minutes
+}
+
+/// How steeply roughing goes down: as the job asks, but no faster than the tool plunges.
+fn ramp_slope(operation: &job::Operation, tool: &Tool) -> f64 {
+    match operation.ramp_or_default_deg() {
+        deg if deg >= 90.0 => f64::INFINITY,
+        deg => deg.to_radians().tan().min(tool.plunge_mm_min / tool.feed_mm_min),
+    }
 }
 
 fn pattern(operation: &job::Operation) -> finish::Pattern {

@@ -64,6 +64,22 @@ fn push(run: &mut Profile, vertex: [i32; 2]) {
     run.push(vertex);
 }
 
+/// Height of a polyline whose places rise or fall, at a place between its ends; past them its highest.
+pub(super) fn at(profile: &[[i32; 2]], u: i32) -> f64 {
+    let within = |a: i32, b: i32| (a.min(b)..=a.max(b)).contains(&u);
+    match profile.windows(2).find(|pair| within(pair[0][0], pair[1][0])) {
+        Some(pair) => height(pair[0], pair[1], u),
+        None => profile.iter().fold(f64::NEG_INFINITY, |most, vertex| most.max(f64::from(vertex[1]))),
+    }
+}
+
+/// The highest point of a polyline between two places, in whole units.
+pub(super) fn highest(profile: &[[i32; 2]], from: i32, to: i32) -> i32 {
+    let inside = profile.iter().filter(|vertex| (from.min(to)..=from.max(to)).contains(&vertex[0]));
+    let ends = [from, to].map(|u| at(profile, u).ceil() as i32);
+    inside.map(|vertex| vertex[1]).chain(ends).fold(i32::MIN, i32::max)
+}
+
 /// Height of the segment a b at u.
 fn height(a: [i32; 2], b: [i32; 2], u: i32) -> f64 {
     let t = f64::from(u - a[0]) / f64::from(b[0] - a[0]);
@@ -86,11 +102,6 @@ fn crossing(a: [i32; 2], b: [i32; 2], z: i32) -> i32 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-
-    fn at(profile: &[[i32; 2]], u: i32) -> f64 {
-        let k = profile.partition_point(|v| v[0] <= u).min(profile.len() - 1).max(1);
-        height(profile[k - 1], profile[k], u)
-    }
 
     #[test]
     fn a_valley_is_cut_level_by_level() {

@@ -18,6 +18,7 @@ mod levels;
 mod link;
 mod passes;
 mod pen;
+mod ramp;
 mod rest;
 pub mod rough;
 mod slant;

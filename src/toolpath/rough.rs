@@ -10,6 +10,7 @@ use super::envelope::{Cutter, Envelope};
 use super::finish::{Pattern, backwards};
 use super::levels::{self, Profile};
 use super::pen::Pen;
+use super::ramp::ramp;
 use super::strip::{Border, Strip, band_length};
 use super::{Axis, Error, Layout, Progress, Site, Toolpath, funnel};
 use crate::compensation::{self, Faces};
@@ -37,6 +38,8 @@ pub struct Params {
     pub direction_deg: f64,
     /// One way: every cut climbs, and begins anew.
     pub pattern: Pattern,
+    /// Fall over way at which the cutter goes down into solid metal; infinite: straight down.
+    pub ramp_slope: f64,
     /// Metal around the part that later cutters need out of the way: their overrun plus their radius.
     pub clear_mm: f64,
 }
@@ -54,6 +57,19 @@ struct Plan {
     rows: Vec<Row>,
     /// Units of a stretch of `Row::between`, a whole number of positions.
     coarse: i32,
+}
+
+impl Plan {
+    /// Bound in units of a level link to row `k` from the one before, at a place along them.
+    fn between(&self, k: usize, u: i32) -> Option<f64> {
+        let place = (u - self.layout.start) / self.coarse;
+        self.rows[k].between.get(place.max(0) as usize).copied()
+    }
+
+    /// Half of what row `k` is apart from the one before.
+    fn half_stepover_mm(&self, site: &Site, k: usize) -> f64 {
+        0.5 * f64::from(self.rows[k].across - self.rows[k - 1].across) * site.unit_mm
+    }
 }
 
 /// Plans the levels of a roughing operation. The path stays `stock_to_leave_mm` above the samples (less the
@@ -238,7 +254,12 @@ fn cut_level(site: &Site, params: &Params, plan: &Plan, above: i32, level: i32, 
             if climbs && backwards(params.pattern, plan.layout.along, k) {
                 cut.reverse();
             }
-            pen.begin(point(cut[0][0], plan.rows[k].across, cut[0][1]), above);
+            let entry = |z| point(cut[0][0], plan.rows[k].across, z);
+            let down = ramp(&cut, above, params.ramp_slope);
+            pen.begin(entry(if down.len() > 1 { above } else { cut[0][1] }), above);
+            for &[u, z] in &down {
+                pen.cut(point(u, plan.rows[k].across, z));
+            }
             loop {
                 for &[u, z] in &cut[1..] {
                     pen.cut(point(u, plan.rows[k].across, z));
@@ -249,12 +270,16 @@ fn cut_level(site: &Site, params: &Params, plan: &Plan, above: i32, level: i32, 
                 let Some((at, next)) = follow(site, params, plan, k + 1, &cut, &mut rows, above) else {
                     break;
                 };
+                let over =
+                    crossing_height(params, plan, k + 1, (&cut, &next), at).map_or(above, |z| z.min(above));
                 let (from, to) = (plan.rows[k].across, plan.rows[k + 1].across);
-                pen.cut(point(cut[cut.len() - 1][0], from, above));
-                pen.cut(point(at, from, above));
-                pen.cut(point(at, to, above));
-                pen.cut(point(next[0][0], to, above));
-                pen.cut(point(next[0][0], to, next[0][1]));
+                pen.cut(point(cut[cut.len() - 1][0], from, over));
+                pen.cut(point(at, from, over));
+                pen.cut(point(at, to, over));
+                pen.cut(point(next[0][0], to, over));
+                for [u, z] in ramp(&next, over, params.ramp_slope) {
+                    pen.cut(point(u, to, z));
+                }
                 (k, cut) = (k + 1, next);
             }
         }
@@ -292,6 +317,24 @@ fn follow(
     Some((at, cut))
 }
 
+/// How high to cross over at `at` from one row's cut to the next row's: as low as what was cut in both rows and the
+/// surface between them, so that the cutter enters the next row from the side and not from above.
+fn crossing_height(
+    params: &Params,
+    plan: &Plan,
+    k: usize,
+    (last, next): (&[[i32; 2]], &[[i32; 2]]),
+    at: i32,
+) -> Option<i32> {
+    // Any other bottom left cusps at the level above, which from here would be past the stepdown.
+    if !matches!(params.shape, Shape::Flat { .. }) {
+        return None;
+    }
+    let rows = levels::highest(last, last[last.len() - 1][0], at).max(levels::highest(next, next[0][0], at));
+    let between = plan.between(k, at)?.ceil();
+    (between <= f64::from(i32::MAX)).then(|| rows.max(between as i32))
+}
+
 /// Where to cross over from the end of one row's cut to the end `to` of the next row's, at the height of
 /// the level above: both rows have been cut at that height a little to both sides, so what stands
 /// between them is at most a cusp, and the surface between them is lower.
@@ -311,7 +354,7 @@ fn crossing(
         (a.min(b), a.max(b))
     };
     let (a, b) = (ends(last), ends(next));
-    let apart_mm = 0.5 * f64::from(plan.rows[k].across - plan.rows[k - 1].across) * site.unit_mm;
+    let apart_mm = plan.half_stepover_mm(site, k);
     let radius = params.shape.radius_mm();
     let inside_mm = radius - (radius * radius - apart_mm * apart_mm).max(0.0).sqrt();
     let inside = (inside_mm / site.unit_mm).ceil() as i32 + 1;
@@ -320,11 +363,7 @@ fn crossing(
         return None;
     }
     let from = last[last.len() - 1][0];
-    let free = |u: i32| {
-        let place = (u - plan.layout.start) / plan.coarse;
-        let bounds = &plan.rows[k].between;
-        bounds.get(place.max(0) as usize).is_some_and(|&z| z <= f64::from(above))
-    };
+    let free = |u: i32| plan.between(k, u).is_some_and(|z| z <= f64::from(above));
     let longest = (LONGEST_STEPOVERS * 2.0 * apart_mm / site.unit_mm) as i64;
     let length = |u: i32| i64::from(from - u).abs() + i64::from(to - u).abs();
     let start = to.clamp(low, high);

@@ -95,6 +95,7 @@ pub struct Stock {
 pub struct Cut {
     pub deepest_bite_mm: f64,
     pub deepest_rapid_mm: f64,
+    pub deepest_plunge_mm: f64,
 }
 
 impl Stock {
@@ -119,7 +120,9 @@ impl Stock {
         for step in &path.moves[1..] {
             let to = mm(step.to);
             let length = (0..3).map(|k| (to[k] - at[k]).powi(2)).sum::<f64>().sqrt();
-            let points = (length / dense_mm).ceil().max(1.0) as usize;
+            // What a plunge goes into, it goes into at once.
+            let once = step.kind == Kind::Plunge;
+            let points = if once { 1 } else { (length / dense_mm).ceil().max(1.0) as usize };
             for i in 0..=points {
                 let t = i as f64 / points as f64;
                 turn += 2.4;
@@ -131,6 +134,9 @@ impl Stock {
                 let bite = self.stand(shape, [place[0], place[1], place[2]]);
                 if step.kind == Kind::Rapid {
                     cut.deepest_rapid_mm = cut.deepest_rapid_mm.max(bite);
+                }
+                if step.kind == Kind::Plunge {
+                    cut.deepest_plunge_mm = cut.deepest_plunge_mm.max(bite);
                 }
                 cut.deepest_bite_mm = cut.deepest_bite_mm.max(bite);
             }
