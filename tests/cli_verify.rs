@@ -235,6 +235,17 @@ fn an_estimate_says_what_limits() {
         .stdout(
             predicate::str::contains("cutting").and(predicate::str::contains("verify against your machine")),
         );
+    let far = "G21 G90\nM3 S9000\nG0 Z5\nG0 X0 Y0\nG1 Z-1 F80\nX900\nG0 Z5\nM2\n";
+    std::fs::write(dir.path().join("far.ngc"), far).expect("a program");
+    screenmill()
+        .current_dir(dir.path())
+        .args(["estimate", "far.ngc", "--machine", "linuxcnc-mill"])
+        .assert()
+        .success()
+        .stdout(
+            predicate::str::contains("cutting 906.0 mm, 0.7 s rapids 6.0 mm")
+                .and(predicate::str::contains("note: moves 900.000 mm in X, linuxcnc-mill travels 400 mm")),
+        );
 }
 
 #[test]

@@ -83,6 +83,17 @@ fn lone_carriage_returns_end_lines() {
     assert!(refusal("^DF\r^PA\rV5\r!QQ1\r").starts_with("line 4, column 1: "), "a place in RML-1");
 }
 
+/// A transfer that broke off between two lines leaves a text that runs, and the cutter in the part.
+#[test]
+fn rml_that_ends_with_the_spindle_on_is_told() {
+    let text = |end: &str| format!("^DF\n^PA\nV5\n!MC1\n!ZM200\nZ0,0,200\nZ0,0,-10\n{end}");
+    assert_eq!(read(&text("")).summary.notes, [Note::SpindleOn { line: 7 }]);
+    assert_eq!(read(&text("H\n!MC\n")).summary.notes, [Note::SpindleOn { line: 9 }]);
+    for end in ["H\n", "!MC0\n", "^DF\n"] {
+        assert_eq!(read(&text(end)).summary.notes, []);
+    }
+}
+
 #[test]
 fn a_start_is_not_known_until_named() {
     let reading = read(PLAIN);

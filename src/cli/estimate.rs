@@ -11,7 +11,7 @@ use screenmill::verify::{
 use serde_json::{Map, Value, json};
 
 use super::console::Console;
-use super::program::{Refused, bounds, clock, language, reading_options, stream};
+use super::program::{Refused, bounds, clock, language, length, past_travel, reading_options, stream};
 use super::{Common, Outcome, Refusal};
 
 /// Milling time of a job or of programs, with what limits it
@@ -44,6 +44,8 @@ struct Estimated {
     summary: Summary,
     extent: Extent,
     timing: Timing,
+    /// What its operator should know.
+    notes: Vec<String>,
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
@@ -66,7 +68,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let mut limits: Vec<(&'static str, f64)> = Vec::new();
     let mut programs = Vec::new();
     for path in &arguments.programs {
-        let one = estimate(path, &options, &kinematics)?;
+        let mut one = estimate(path, &options, &kinematics)?;
+        one.notes.extend(past_travel(&one.extent, &machine));
         total_s += one.timing.total_s;
         for (name, seconds) in one.timing.limits() {
             match limits.iter_mut().find(|l| l.0 == name) {
@@ -124,12 +127,12 @@ fn job(path: &Path, common: &Common) -> Result<Outcome, Refusal> {
             println!("{name}: {}", clock(*seconds));
         }
         println!(
-            "{} on {} in {} tile(s), {:.1} m of cut, {:.1} m of rapids: {}",
+            "{} on {} in {} tile(s), {} of cut, {} of rapids: {}",
             clock(estimated.total_s),
             estimated.machine,
             estimated.tiles,
-            1e-3 * estimated.cutting_mm,
-            1e-3 * estimated.rapid_mm,
+            length(estimated.cutting_mm),
+            length(estimated.rapid_mm),
             shares(&estimated.limits, estimated.total_s)
         );
         if !estimated.unconfirmed.is_empty() {
@@ -156,7 +159,8 @@ fn estimate(path: &Path, options: &Options, kinematics: &Kinematics) -> Result<E
         }
     })?;
     let timing = timer.finish(summary.bytes);
-    Ok(Estimated { summary, extent, timing })
+    let notes = summary.notes.iter().map(ToString::to_string).collect();
+    Ok(Estimated { summary, extent, timing, notes })
 }
 
 /// RML-1 has no rapids, so its travels have to be found before the text is timed.
@@ -185,7 +189,7 @@ fn shares(limits: &[(&'static str, f64)], total_s: f64) -> String {
 }
 
 fn program(path: &Path, one: &Estimated) -> Value {
-    let Estimated { summary, extent, timing } = one;
+    let Estimated { summary, extent, timing, notes } = one;
     let limits = timing.limits();
     json!({
         "file": path.display().to_string(), "language": summary.language.to_string(),
@@ -194,27 +198,27 @@ fn program(path: &Path, one: &Estimated) -> Value {
         "time_s": timing.total_s, "cutting_s": timing.cutting_s, "rapid_s": timing.rapid_s,
         "dwell_s": timing.dwell_s, "pauses": timing.pauses,
         "limited_by": limits.first().map(|l| l.0), "parts": parts(&limits),
-        "notes": summary.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "notes": notes,
     })
 }
 
 fn print(path: &Path, one: &Estimated) {
-    let Estimated { summary, extent, timing } = one;
+    let Estimated { summary, extent, timing, notes } = one;
     println!("{}: {}, {} blocks", path.display(), summary.language, summary.blocks);
     println!(
-        "  {} ({} cutting {:.1} m, {} rapids {:.1} m, {} dwell)",
+        "  {} ({} cutting {}, {} rapids {}, {} dwell)",
         clock(timing.total_s),
         clock(timing.cutting_s),
-        1e-3 * extent.cutting_mm,
+        length(extent.cutting_mm),
         clock(timing.rapid_s),
-        1e-3 * extent.rapid_mm,
+        length(extent.rapid_mm),
         clock(timing.dwell_s)
     );
     println!("  {}", shares(&timing.limits(), timing.total_s));
     if timing.pauses > 0 {
         println!("  {} stops for the operator, whose time is not counted", timing.pauses);
     }
-    for note in &summary.notes {
+    for note in notes {
         println!("  note: {note}");
     }
 }

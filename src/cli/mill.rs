@@ -75,10 +75,10 @@ fn print(milled: &pipeline::Milled, out: &Path) {
     );
     for program in report.tiles.iter().flat_map(|tile| &tile.programs) {
         println!(
-            "program   {}: {} blocks, {:.1} m cut, {}, bites {:.3} mm",
+            "program   {}: {} blocks, {} cut, {}, bites {:.3} mm",
             program.file,
             program.blocks,
-            program.cutting_mm * 1e-3,
+            super::program::length(program.cutting_mm),
             super::hours(program.time_s),
             program.deepest_bite_mm
         );

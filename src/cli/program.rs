@@ -96,6 +96,23 @@ pub fn bounds(extent: &Extent) -> Value {
     json!({ "x": axis(0), "y": axis(1), "z": axis(2) })
 }
 
+/// The axes on which a program goes farther than its machine can.
+pub fn past_travel(extent: &Extent, machine: &Machine) -> Vec<String> {
+    let travel = [machine.travel.x_mm, machine.travel.y_mm, machine.travel.z_mm];
+    let span = |axis: usize| extent.high_mm[axis] - extent.low_mm[axis];
+    let past = (0..3).filter(|axis| span(*axis) > travel[*axis]);
+    past.map(|axis| {
+        let name = ["X", "Y", "Z"][axis];
+        format!("moves {:.3} mm in {name}, {} travels {} mm", span(axis), machine.name, travel[axis])
+    })
+    .collect()
+}
+
+/// A length as an operator says it.
+pub fn length(mm: f64) -> String {
+    if mm < 1000.0 { format!("{mm:.1} mm") } else { format!("{:.1} m", 1e-3 * mm) }
+}
+
 /// A time as an operator says it.
 pub fn clock(seconds: f64) -> String {
     let whole = seconds.round() as u64;

@@ -15,7 +15,7 @@ use screenmill::verify::{
 use serde_json::{Value, json};
 
 use super::console::Console;
-use super::program::{bounds, clock, read, reading_options};
+use super::program::{bounds, clock, length, past_travel, read, reading_options};
 use super::{Common, Outcome, Refusal};
 
 /// A gouge past this fails.
@@ -348,19 +348,8 @@ impl Program {
     }
 
     fn travel(&self, machine: &Machine, findings: &mut Vec<Finding>) {
-        let travel = [machine.travel.x_mm, machine.travel.y_mm, machine.travel.z_mm];
-        for axis in 0..3 {
-            let span = self.extent.high_mm[axis] - self.extent.low_mm[axis];
-            if span > travel[axis] {
-                let message = format!(
-                    "{} moves {span:.3} mm in {}, {} travels {} mm",
-                    self.file,
-                    ["X", "Y", "Z"][axis],
-                    machine.name,
-                    travel[axis]
-                );
-                findings.push(finding(Severity::Error, "travel", message));
-            }
+        for past in past_travel(&self.extent, machine) {
+            findings.push(finding(Severity::Error, "travel", format!("{} {past}", self.file)));
         }
     }
 
@@ -476,9 +465,9 @@ fn print(judgement: &Judgement, failed: bool) {
         let Program { file, cutter, extent, timing, cut, .. } = program;
         let time = timing.map_or(String::new(), |t| format!(", {}", clock(t.total_s)));
         println!(
-            "{file}, {cutter}: {:.1} m cutting, {:.1} m rapids, deepest bite {:.4} mm{time}",
-            1e-3 * extent.cutting_mm,
-            1e-3 * extent.rapid_mm,
+            "{file}, {cutter}: {} cutting, {} rapids, deepest bite {:.4} mm{time}",
+            length(extent.cutting_mm),
+            length(extent.rapid_mm),
             cut.deepest_bite_mm()
         );
     }

@@ -78,6 +78,8 @@ impl fmt::Display for Language {
 pub enum Note {
     /// The first feed motion comes with the spindle off.
     SpindleOff { line: u32 },
+    /// The text of an RML-1 program ends while the spindle turns.
+    SpindleOn { line: u32 },
     /// Some controllers count P in milliseconds.
     LongDwell { line: u32, seconds: f64 },
 }
@@ -87,6 +89,12 @@ impl fmt::Display for Note {
         match self {
             Note::SpindleOff { line } => {
                 write!(f, "line {line}: the first feed motion comes with the spindle off")
+            }
+            Note::SpindleOn { line } => {
+                write!(
+                    f,
+                    "line {line}: the text ends while the spindle turns, without !MC0 or H; hint: is the file complete?"
+                )
             }
             Note::LongDwell { line, seconds } => {
                 write!(

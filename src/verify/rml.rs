@@ -7,7 +7,7 @@
 use std::io::BufRead;
 
 use super::error::{Error, Place};
-use super::reading::{Event, Language, Motion, Options, Summary};
+use super::reading::{Event, Language, Motion, Note, Options, Summary};
 
 /// The range of RML-1's float parameter.
 const LOWEST: f64 = -8_388_608.0;
@@ -29,15 +29,22 @@ pub(super) fn read(source: &mut dyn BufRead, options: &Options, each: &mut Sink)
         down_units: 0.0,
         up_units: None,
         dwell_ms: 0.0,
+        turns: false,
         began: None,
     };
     let mut summary = Summary { language: Language::Rml1, blocks: 0, bytes: 0, notes: Vec::new() };
     let mut numbers = Vec::new();
+    let mut last = None;
     while let Some((command, at)) = scanner.command(&mut numbers)? {
         summary.blocks += 1;
+        last = Some(at);
         machine.run(command, &numbers, at, each)?;
     }
     summary.bytes = scanner.bytes;
+    if machine.turns {
+        let line = last.and_then(|at: Place| u32::try_from(at.line).ok()).unwrap_or(u32::MAX);
+        summary.notes.push(Note::SpindleOn { line });
+    }
     if summary.blocks == 0 {
         return Err(Error::Empty);
     }
@@ -243,6 +250,8 @@ struct Machine {
     down_units: f64,
     up_units: Option<f64>,
     dwell_ms: f64,
+    /// Whether !MC has the spindle turn.
+    turns: bool,
     began: Option<u8>,
 }
 
@@ -289,6 +298,7 @@ impl Machine {
                 self.speed_down_mm_s = None;
                 (self.down_units, self.up_units) = (0.0, None);
                 self.dwell_ms = 0.0;
+                self.turns = false;
                 if name == "IN" {
                     self.at_mm = [f64::NAN; 3];
                 }
@@ -325,6 +335,7 @@ impl Machine {
                 for number in numbers {
                     ranged(*number, "the switch", -32_768.0, 32_767.0)?;
                 }
+                self.turns = numbers.first().is_none_or(|number| number.value != 0.0);
             }
             "!RC" => {
                 count(|n| n == 1, "one speed code")?;
@@ -347,6 +358,7 @@ impl Machine {
             }
             "H" => {
                 count(|n| n == 0, "none")?;
+                self.turns = false;
                 // To the top, then to the origin: where the top is, only the machine knows.
                 let up = [self.at_mm[0], self.at_mm[1], f64::NAN];
                 self.go(up, f64::INFINITY, line, each)?;

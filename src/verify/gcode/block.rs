@@ -120,7 +120,16 @@ impl Block {
                 b'#' | b'[' | b'<' | b'=' => return Err(Error::Expression { at, found: byte as char }),
                 b'a'..=b'z' | b'A'..=b'Z' => {
                     let letter = byte.to_ascii_uppercase();
-                    let (value, after) = number(text, i + 1, letter, line)?;
+                    let (value, after) = number(text, i + 1, letter, line).map_err(|error| match error {
+                        // O100 call, O100 while [...]
+                        Error::NumberMissing { .. } if self.has(b'O') => Error::Unread {
+                            at: self.place(b'O'),
+                            code: "O",
+                            what: "a subprogram or a loop",
+                            hint: "write its motions out with G0 and G1",
+                        },
+                        other => other,
+                    })?;
                     self.word(letter, value, at)?;
                     i = after;
                 }
