@@ -17,7 +17,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::passes::{Layout, tip_radius_mm};
-use super::strip::Strip;
+use super::strip::{Ceiling, Strip};
 use crate::compensation::{self, Faces, Profile, RowTarget};
 use crate::cutter::Shape;
 use crate::tolerance::Budget;
@@ -27,6 +27,9 @@ const BULGE_MOST: f64 = 0.25;
 
 /// Distances from the axis, as parts of the radius, within which the highest sample is known.
 pub(super) const RINGS: [f64; 4] = [1.0, 0.93, 0.85, 0.75];
+
+/// Intervals that are first bounded together.
+const TOGETHER: usize = 16;
 
 /// Columns of the blocks in which steep places are evaluated together.
 const STEEP_BLOCK: usize = 256;
@@ -143,8 +146,17 @@ impl Cutter {
         let mut bound_mm: Vec<f64> =
             cl_mm.iter().map(|&z| if z.is_nan() { f64::NEG_INFINITY } else { f64::from(z) }).collect();
         let mut steep = vec![false; cl_mm.len().saturating_sub(1)];
+        let mut level = 0;
         for i in 1..cl_mm.len() {
-            if cl_mm[i - 1].is_nan() || cl_mm[i].is_nan() {
+            if (i - 1).is_multiple_of(TOGETHER) {
+                let end = (i + TOGETHER).min(cl_mm.len());
+                let first_mm = layout.start_mm() + (i as f64 - 0.5) * self.pitch_mm;
+                let last_mm = layout.start_mm() + (end as f64 - 1.5) * self.pitch_mm;
+                if self.is_level(&cl_mm[i - 1..end], &ceilings, first_mm, last_mm) {
+                    level = end;
+                }
+            }
+            if i < level || cl_mm[i - 1].is_nan() || cl_mm[i].is_nan() {
                 continue;
             }
             let (left, right) = (f64::from(cl_mm[i - 1]), f64::from(cl_mm[i]));
@@ -159,6 +171,15 @@ impl Cutter {
             }
         }
         (Envelope { bound_mm, cl_mm }, steep)
+    }
+
+    /// Whether no interval between these locations asks for more than its chord: the farthest contact that any of them
+    /// can have, from the lowest location and the highest ceilings, does not.
+    fn is_level(&self, cl_mm: &[f32], ceilings: &[Ceiling], first_mm: f64, last_mm: f64) -> bool {
+        let known = cl_mm.iter().filter(|z| !z.is_nan());
+        let lowest = known.fold(f32::INFINITY, |low, &z| if z < low { z } else { low });
+        let contact = self.contact_mm(f64::from(lowest), |ring| ceilings[ring].highest(first_mm, last_mm));
+        contact.and_then(|t| self.lift_mm(t)) == Some(0.0)
     }
 
     /// How far from its line the cutter may be, sideways and by the controller.

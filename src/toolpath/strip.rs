@@ -106,9 +106,24 @@ impl Strip {
 
 /// Raises each height to the other one, where that is data.
 fn raise(heights: &mut [f32], others: &[f32]) {
-    for (z, &other) in heights.iter_mut().zip(others) {
-        *z = if other > *z { other } else { *z };
+    #[inline(always)]
+    fn body(heights: &mut [f32], others: &[f32]) {
+        for (z, &other) in heights.iter_mut().zip(others) {
+            *z = if other > *z { other } else { *z };
+        }
     }
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2(heights: &mut [f32], others: &[f32]) {
+            body(heights, others);
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the feature was found on this processor.
+            return unsafe { avx2(heights, others) };
+        }
+    }
+    body(heights, others);
 }
 
 /// An upper bound of the heights in reach along one pass.
@@ -122,8 +137,20 @@ pub(super) struct Ceiling {
 impl Ceiling {
     /// The highest point in reach of a place along the pass.
     pub(super) fn at(&self, along_mm: f64) -> f64 {
+        f64::from(self.z_mm[self.index(along_mm)]) + self.missed_mm
+    }
+
+    /// The highest point in reach of any place between two along the pass.
+    pub(super) fn highest(&self, first_mm: f64, last_mm: f64) -> f64 {
+        let (first, last) = (self.index(first_mm), self.index(last_mm));
+        let all = &self.z_mm[first..=last.max(first)];
+        let most = all.iter().fold(f32::NEG_INFINITY, |most, &z| if z > most { z } else { most });
+        f64::from(most) + self.missed_mm
+    }
+
+    fn index(&self, along_mm: f64) -> usize {
         let column = (along_mm / self.step_mm).floor() as i64 - self.first;
-        f64::from(self.z_mm[column.clamp(0, self.z_mm.len() as i64 - 1) as usize]) + self.missed_mm
+        column.clamp(0, self.z_mm.len() as i64 - 1) as usize
     }
 }
 
