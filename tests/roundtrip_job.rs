@@ -378,6 +378,26 @@ fn gcode_and_rml_move_along_the_same_curve() {
     }
 }
 
+/// Holes, marks and the slot with its tabs too: the same bound as for a finish.
+#[test]
+fn gcode_and_rml_move_along_the_same_curve_beside_the_surface() {
+    let of = |machine: &str| {
+        let bench = with_all_beside(&[("name = \"linuxcnc-mill\"", machine)]);
+        let report = bench.mill(0);
+        let simplify = report["fidelity"]["gouge_budget_mm"]["simplify"].as_f64().expect("a share");
+        ([0, 1, 3, 4, 7].map(|nth| path(&bench, nth, 0.01)), simplify)
+    };
+    let (gcode, first) = of("name = \"linuxcnc-mill\"");
+    let (rml, second) = of("name = \"roland-egx-600\"");
+    for (nth, (gcode, rml)) in gcode.iter().zip(&rml).enumerate() {
+        for (a, b) in [(gcode, rml), (rml, gcode)] {
+            let (distance, at) = strays(a, b);
+            let most = 0.01 + first + second;
+            assert!(distance <= most, "{nth}: {distance} of {most} at {at:?}");
+        }
+    }
+}
+
 /// A finer ball goes only where the one before it could not reach: the surface is that of passing everywhere, in a
 /// fraction of the way.
 #[test]
