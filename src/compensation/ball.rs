@@ -30,7 +30,7 @@ impl Reachable {
 }
 
 /// How far off neighbours are looked at, in samples.
-pub(super) const FARTHEST: usize = 32;
+pub(super) const FARTHEST: usize = 24;
 
 /// Room for the rounding of this file's own arithmetic, in samples.
 const ROOM: f64 = 0.01;
@@ -124,7 +124,7 @@ impl Ball {
         let before = at.groups();
         let row = |a: i64| if a >= 0 && a < field.rows as i64 { field.row(a)[i] } else { NONE };
         let beside = |i: usize| field.row(a).get(i).copied().unwrap_or(NONE);
-        for m in [2usize, 3, 4, 6, 8, 12, 16, 24, FARTHEST] {
+        for m in [2usize, 3, 4, 6, 8, 12, 16, FARTHEST] {
             if m as f64 >= self.radius {
                 break;
             }

@@ -1,6 +1,7 @@
 use super::ball::{Ball, Reachable};
 use super::field::{Field, PAD};
 use super::lanes::{LANES, LEAST, Vectors, groups};
+use super::runs::Offsets;
 use super::slopes::Rises;
 use std::marker::PhantomData;
 
@@ -643,6 +644,15 @@ impl<V: Vectors> Boxes<V> {
         Reachable {
             x: [f64::from(self.x_low[r][lane]), f64::from(self.x_high[r][lane])],
             y: [f64::from(self.y_low[r][lane]), f64::from(self.y_high[r][lane])],
+        }
+    }
+
+    /// The box of one sample, whose offsets are whole.
+    #[inline(always)]
+    pub fn offsets(&self, r: usize, lane: usize) -> Offsets {
+        Offsets {
+            x: [self.x_low[r][lane] as i32, self.x_high[r][lane] as i32],
+            y: [self.y_low[r][lane] as i32, self.y_high[r][lane] as i32],
         }
     }
 

@@ -1,6 +1,15 @@
 use super::field::{Field, PAD, Targets};
-use super::lanes::{LANES, NONE, Vectors, higher, raise_both, whole_groups, widest};
+use super::lanes::{LANES, NONE, Vectors, groups, groups_mut, higher, whole_groups, widest};
 use super::pairs::Pairs;
+use std::ops::Range;
+
+/// Columns of targets that are worked on together: what their rows ask of the tables stays in the
+/// nearest cache.
+const STRIP: usize = 512;
+
+/// Rows of samples whose chords are taken together, so that targets are read and written once for
+/// all of them.
+const ROWS: usize = 4;
 
 widest! {
     /// The flat bottom: maxima over discs, chord by chord. Each row's maxima over 2^p samples are
@@ -13,34 +22,109 @@ widest! {
 #[inline(always)]
 pub(super) fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) {
     let levels = (2.0 * reach + 2.0).log2().floor() as usize + 1;
-    let length = field.row(-1).len();
-    let columns = whole_groups(out.columns);
-    let mut maxima = vec![NONE; levels * length];
-    for a in 0..field.rows as i64 {
-        maxima[..length].copy_from_slice(field.row(a));
-        for level in 1..levels {
+    let shifts = (0..out.rows)
+        .map(|b| pairs.shift(b))
+        .fold([i64::MAX, i64::MIN], |[low, high], shift| [low.min(shift), high.max(shift)]);
+    if out.rows == 0 {
+        return;
+    }
+    let halo = reach.ceil() as i64 + 1;
+    let mut maxima = Maxima::default();
+    for strip in (0..out.columns).step_by(STRIP) {
+        let columns = whole_groups((out.columns - strip).min(STRIP));
+        let start = PAD as i64 + strip as i64;
+        let from = (start + shifts[0] - halo).max(0);
+        let end = start + shifts[1] + columns as i64 + halo + LANES as i64;
+        let end = end.min(field.row(-1).len() as i64).max(from);
+        maxima.hold(from as usize..end as usize, levels);
+        for a in (0..field.rows as i64).step_by(ROWS) {
+            let rows = ROWS.min(field.rows - a as usize);
+            for k in 0..rows {
+                maxima.fill::<V>(k, field.row(a + k as i64));
+            }
+            let targets = (a..a + rows as i64)
+                .map(|a| pairs.targets(a, -reach, reach))
+                .filter(|targets| !targets.is_empty())
+                .reduce(|all, targets| all.start.min(targets.start)..all.end.max(targets.end));
+            for b in targets.unwrap_or(0..0) {
+                let mut chords: [[&[f32]; 2]; ROWS] = [[&[]; 2]; ROWS];
+                let mut count = 0;
+                for k in 0..rows {
+                    let Some(arc) = pairs.arc(a + k as i64, b) else { continue };
+                    let (lo, hi) = (i64::from(arc.arc.flat_lo), i64::from(arc.arc.flat_hi));
+                    if lo <= hi {
+                        chords[count] = maxima.chord(k, start + pairs.shift(b), [lo, hi], columns);
+                        count += 1;
+                    }
+                }
+                let to = &mut out.row_mut(b)[strip..][..columns];
+                match chords {
+                    _ if count == 0 => {}
+                    [p, q, r, s] if count == ROWS => raise::<V, 4>(to, [p, q, r, s]),
+                    [p, q, r, _] if count == 3 => raise::<V, 3>(to, [p, q, r]),
+                    [p, q, _, _] if count == 2 => raise::<V, 2>(to, [p, q]),
+                    [p, _, _, _] => raise::<V, 1>(to, [p]),
+                }
+            }
+        }
+    }
+}
+
+/// to = max(to, both of all chords), over whole groups.
+#[inline(always)]
+fn raise<V: Vectors, const N: usize>(to: &mut [f32], chords: [[&[f32]; 2]; N]) {
+    let chords = chords.map(|chord| chord.map(|row| groups(&row[..to.len()])));
+    for (g, to) in groups_mut(to).iter_mut().enumerate() {
+        let mut best = V::load(to);
+        for [near, far] in &chords {
+            best = V::greater(V::greater(V::load(&near[g]), V::load(&far[g])), best);
+        }
+        V::store(best, to);
+    }
+}
+
+/// The highest of 2^level samples from each one on, of some rows and columns.
+#[derive(Default)]
+struct Maxima {
+    columns: Range<usize>,
+    levels: usize,
+    /// Row by row, level by level.
+    z: Vec<f32>,
+}
+
+impl Maxima {
+    fn hold(&mut self, columns: Range<usize>, levels: usize) {
+        self.z.clear();
+        self.z.resize(ROWS * levels * columns.len(), NONE);
+        (self.columns, self.levels) = (columns, levels);
+    }
+
+    #[inline(always)]
+    fn fill<V: Vectors>(&mut self, k: usize, row: &[f32]) {
+        let length = self.columns.len();
+        let tables = &mut self.z[k * self.levels * length..][..self.levels * length];
+        tables[..length].copy_from_slice(&row[self.columns.clone()]);
+        for level in 1..self.levels {
             let half = 1usize << (level - 1);
-            let (lower, upper) = maxima[(level - 1) * length..][..2 * length].split_at_mut(length);
+            let (lower, upper) = tables[(level - 1) * length..][..2 * length].split_at_mut(length);
             // Past the end there is no data, so the last maxima are those of half the length.
             let whole = length.saturating_sub(half) / LANES * LANES;
-            higher::<V>(&mut upper[..whole], &lower[..whole], &lower[half..][..whole]);
+            higher::<V>(&mut upper[..whole], &lower[..whole], &lower[half.min(length)..][..whole]);
             for i in whole..length {
                 let far = lower.get(i + half).copied().unwrap_or(NONE);
                 upper[i] = if lower[i] > far { lower[i] } else { far };
             }
         }
-        for b in pairs.targets(a, -reach, reach) {
-            let Some(arc) = pairs.arc(a, b) else { continue };
-            let (lo, hi) = (arc.arc.flat_lo as i64, arc.arc.flat_hi as i64);
-            if lo > hi {
-                continue;
-            }
-            let level = (hi - lo + 1).ilog2() as usize;
-            let row = &maxima[level * length..][..length];
-            let start = PAD as i64 + pairs.shift(b);
-            let near = &row[(start + lo) as usize..][..columns];
-            let far = &row[(start + hi + 1 - (1i64 << level)) as usize..][..columns];
-            raise_both::<V>(&mut out.row_mut(b)[..columns], near, far);
-        }
+    }
+
+    /// Two tables' rows whose maximum is that of samples `lo ..= hi` columns from each of `count`
+    /// from `start` on.
+    #[inline(always)]
+    fn chord(&self, k: usize, start: i64, [lo, hi]: [i64; 2], count: usize) -> [&[f32]; 2] {
+        let length = self.columns.len();
+        let level = (hi - lo + 1).ilog2() as usize;
+        let row = &self.z[(k * self.levels + level) * length..][..length];
+        let start = start - self.columns.start as i64;
+        [&row[(start + lo) as usize..][..count], &row[(start + hi + 1 - (1i64 << level)) as usize..][..count]]
     }
 }

@@ -20,7 +20,7 @@ use super::field::{Field, PAD, Targets};
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors, widest};
 use super::pairs::Pairs;
-use super::runs::{BoxRows, Offsets, Run, Span, raise_run, raise_sample, raise_spans, row_work};
+use super::runs::{BoxRows, Offsets, Run, Span, raise_narrow, raise_rows, raise_run, raise_spans, row_work};
 use super::slopes::Rises;
 use super::unboxed;
 
@@ -389,38 +389,23 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
     fn single(&mut self, block: Block, [r, lane]: [usize; 2], at: [usize; 2], out: &mut Targets) {
         let a = block.a + r as i64;
         let first = block.first + lane;
-        let mut at = self.boxes.at(at[0], at[1]);
-        let wide = at.x[1] - at.x[0];
         if let Some(on) = self.pairs.on_samples() {
-            let mut offsets = Offsets::of(&at);
-            let mut rows = BoxRows::of(on, a, &offsets);
-            if rows.count == 0 {
-                return;
-            }
-            let mut narrow = None;
-            if wide >= LANES as f64 && rows.count > 2 {
-                let rises = self.lanes.at(r, lane);
-                let every = on.every as i32;
-                let of_rows = |rows: BoxRows| [rows.dy, every, rows.count as i32];
-                let mut groups = self.row_bounds.fill::<V>(&rises, &self.ball, &at, of_rows(rows));
-                if groups as f64 > WIDE {
-                    self.work += FAR_WORK;
-                    match self.ball.far_neighbours(self.field, a, PAD + first, at) {
-                        None => return,
-                        Some(tighter) => at = tighter,
-                    }
-                    offsets = Offsets::of(&at);
-                    rows = BoxRows::of(on, a, &offsets);
-                    groups = self.row_bounds.fill::<V>(&rises, &self.ball, &at, of_rows(rows));
+            let offsets = self.boxes.offsets(at[0], at[1]);
+            let rows = BoxRows::of(on, a, &offsets);
+            if rows.count > 0 {
+                let wide = offsets.x[1] - offsets.x[0];
+                if wide < LANES as i32 {
+                    self.work += 8 * rows.count;
+                    raise_narrow::<V>(self.field, on, [a, first as i64], rows, offsets.x, out);
+                } else {
+                    let at = self.boxes.at(at[0], at[1]);
+                    self.wide([r, lane], [a, first as i64], at, rows, out);
                 }
-                self.work += groups + 6 * rows.count;
-                narrow = Some(&self.row_bounds);
-            } else {
-                self.work += rows.count * row_work(1, wide as usize + 1);
             }
-            raise_sample::<V>(self.field, on, [a, first as i64], rows, &offsets, narrow, out);
             return;
         }
+        let mut at = self.boxes.at(at[0], at[1]);
+        let wide = at.x[1] - at.x[0];
         if wide > 4.0 && at.groups() > WIDE {
             self.work += FAR_WORK;
             match self.ball.far_neighbours(self.field, a, PAD + first, at) {
@@ -434,6 +419,36 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
         let beside = narrowed.then(|| Beside::new(&rises, self.ball.step_mm, self.ball.slack_mm));
         let run = Run { a, first, len: 1 };
         raise_run::<V, P>(self.field, self.pairs, run, &at, out, beside.as_ref());
+    }
+
+    /// Takes one sample whose box is wide, row by row.
+    #[inline(always)]
+    fn wide(
+        &mut self,
+        [r, lane]: [usize; 2],
+        [a, first]: [i64; 2],
+        mut at: Reachable,
+        mut rows: BoxRows,
+        out: &mut Targets,
+    ) {
+        let Some(on) = self.pairs.on_samples() else { return };
+        let rises = self.lanes.at(r, lane);
+        let every = on.every as i32;
+        let of_rows = |rows: BoxRows| [rows.dy, every, rows.count as i32];
+        let mut groups = self.row_bounds.fill::<V>(&rises, &self.ball, &at, of_rows(rows));
+        if groups as f64 > WIDE {
+            self.work += FAR_WORK;
+            match self.ball.far_neighbours(self.field, a, PAD + first as usize, at) {
+                None => return,
+                Some(tighter) => at = tighter,
+            }
+            rows = BoxRows::of(on, a, &Offsets::of(&at));
+            groups = self.row_bounds.fill::<V>(&rises, &self.ball, &at, of_rows(rows));
+        }
+        self.work += groups + 6 * rows.count;
+        let of = &self.row_bounds;
+        let bounds = |k: usize| [of.low[k / LANES][k % LANES] as i32, of.high[k / LANES][k % LANES] as i32];
+        raise_rows::<V>(self.field, on, [a, first], rows, bounds, out);
     }
 }
 

@@ -42,6 +42,7 @@ impl<'a, 'b> Feed<'a, 'b> {
 
     /// Takes the samples that these rows of the field are looked at with, and opens the targets
     /// that they may raise.
+    #[inline(always)]
     pub fn before(&mut self, a: i64, rows: usize, field: &mut Field, targets: &mut Targets) {
         let far = FARTHEST.min(self.reach as usize) as i64 + 1;
         let end = a + rows as i64;
@@ -56,6 +57,7 @@ impl<'a, 'b> Feed<'a, 'b> {
     }
 
     /// Gives the targets that rows from `a` on cannot reach.
+    #[inline(always)]
     pub fn after(&mut self, a: i64, targets: &mut Targets) {
         while self.given < self.opened && self.level + (self.given as i64) * self.every + self.reach < a {
             self.give(targets);
@@ -63,6 +65,7 @@ impl<'a, 'b> Feed<'a, 'b> {
     }
 
     /// Gives all that is left.
+    #[inline(always)]
     pub fn end(&mut self, targets: &mut Targets) {
         while self.given < self.to.len() {
             if self.given == self.opened {
@@ -73,6 +76,7 @@ impl<'a, 'b> Feed<'a, 'b> {
         }
     }
 
+    #[inline(always)]
     fn give(&mut self, targets: &mut Targets) {
         self.sense.give_row(self.to[self.given], targets.row(self.given));
         targets.close();

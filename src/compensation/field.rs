@@ -33,6 +33,7 @@ impl Sense {
 
     /// [`Sense::take`] of a row. One loop a sense, without a branch in it: the compiler makes
     /// vectors of these.
+    #[inline(always)]
     pub fn take_row(self, to: &mut [f32], from: &[f32]) {
         match self {
             Sense::Raise => to.iter_mut().zip(from).for_each(|(to, z)| *to = Sense::Raise.take(*z)),
@@ -41,6 +42,7 @@ impl Sense {
     }
 
     /// [`Sense::give`] of a row.
+    #[inline(always)]
     pub fn give_row(self, to: &mut [f32], from: &[f32]) {
         match self {
             Sense::Raise => to.iter_mut().zip(from).for_each(|(to, z)| *to = Sense::Raise.give(*z)),
@@ -94,6 +96,7 @@ impl Field {
     }
 
     /// Takes a row, from -1 to `rows`, of the samples of `window`.
+    #[inline(always)]
     pub fn take(&mut self, row: i64, h: &Heights, window: Window, sense: Sense) {
         let to = &mut self.z[((row + 1) as usize & self.mask) * self.stride..][..self.stride];
         let row = window.row + row;
@@ -178,11 +181,13 @@ impl Targets {
     }
 
     /// Makes a row ready to be raised.
+    #[inline(always)]
     pub fn open(&mut self, row: usize) {
         self.row_mut(row).fill(NONE);
     }
 
     /// Lets the first row go.
+    #[inline(always)]
     pub fn close(&mut self) {
         self.first += 1;
         self.place = if self.place + 1 == self.held { 0 } else { self.place + 1 };

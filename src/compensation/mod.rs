@@ -51,7 +51,7 @@ pub use profile::Profile;
 pub use stream::{Band, stream, stream_bytes};
 #[doc(hidden)]
 pub use tiles::{Way, cutter_location_by};
-pub use tiles::{closing, cutter_location, cutter_location_rows, erode, residual};
+pub use tiles::{closing, cutter_location, cutter_location_rows, cutter_location_rows_into, erode, residual};
 
 /// Why a compensation was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

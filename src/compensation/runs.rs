@@ -1,5 +1,4 @@
 use super::ball::Reachable;
-use super::blocks::RowBounds;
 use super::field::{Field, PAD, Targets};
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors, groups, groups_mut};
@@ -213,7 +212,7 @@ fn raise_line<V: Vectors>(to: &mut [f32], input: &[f32], s: &[f32]) {
     }
 }
 
-/// The rows of a box in which one sample can touch targets, on samples.
+/// The rows of a box in which one sample can touch targets, on samples: each has its arc.
 #[derive(Clone, Copy)]
 pub(super) struct BoxRows {
     /// First target, and how many.
@@ -228,8 +227,9 @@ impl BoxRows {
     pub fn of(on: &OnSamples, a: i64, at: &Offsets) -> BoxRows {
         let every = on.every as i32;
         let row = (on.input_row + a - on.target_row) as i32;
-        let low = (row - at.y[1]).max(0) as u32;
-        let high = row - at.y[0];
+        let reach = on.reach as i32;
+        let low = (row - at.y[1].min(reach)).max(0) as u32;
+        let high = row - at.y[0].max(-reach);
         let (first, end) = if every == 1 {
             (low as usize, high + 1)
         } else {
@@ -240,39 +240,79 @@ impl BoxRows {
     }
 }
 
-/// [`raise_run`] of one sample, on samples: at the offsets of a box, or at those of `narrow`, row
-/// by row, if it is given.
+/// [`raise_run`] of one sample, on samples, with a box of at most [`LANES`] columns: one cache line
+/// of each target row holds it, or two.
 #[inline(always)]
-pub(super) fn raise_sample<V: Vectors>(
+pub(super) fn raise_narrow<V: Vectors>(
     field: &Field,
     on: &OnSamples,
     [a, first]: [i64; 2],
     rows: BoxRows,
-    at: &Offsets,
-    narrow: Option<&RowBounds>,
+    x: [i32; 2],
     out: &mut Targets,
 ) {
-    let origin = first - on.shift;
+    let origin = (first - on.shift) as i32;
+    let [near, far] = [rows.dy, rows.dy - (rows.count as i32 - 1) * on.every as i32];
+    let shortest = on.stencil.arc_there(if near.abs() > far.abs() { near } else { far }).arc;
+    // Past the rim no further than the padding goes.
+    let rim = LANES as i32;
+    if x[1] > shortest.hi + rim || x[0] < shortest.lo - rim {
+        raise_rows::<V>(field, on, [a, first], rows, |_| x, out);
+        return;
+    }
+    let start = (origin - x[1]).max(0) & -(LANES as i32);
+    if start > (origin - x[0]).min(out.columns as i32 - 1) {
+        return;
+    }
+    let z = V::splat(field.row(a)[PAD + first as usize]);
+    let mut dy = rows.dy;
+    if origin - x[0] - start < LANES as i32 {
+        for k in 0..rows.count {
+            let arc = on.stencil.arc_there(dy);
+            let s = groups(&arc.values[arc.index(origin - start)..][..LANES]);
+            let to = groups_mut(&mut out.row_mut(rows.first + k)[start as usize..][..LANES]);
+            V::store(V::greater(V::add(V::load(&s[0]), z), V::load(&to[0])), &mut to[0]);
+            dy -= on.every as i32;
+        }
+    } else {
+        for k in 0..rows.count {
+            let arc = on.stencil.arc_there(dy);
+            let s = groups(&arc.values[arc.index(origin - start)..][..2 * LANES]);
+            let to = groups_mut(&mut out.row_mut(rows.first + k)[start as usize..][..2 * LANES]);
+            let near = V::greater(V::add(V::load(&s[0]), z), V::load(&to[0]));
+            let far = V::greater(V::add(V::load(&s[1]), z), V::load(&to[1]));
+            V::store(near, &mut to[0]);
+            V::store(far, &mut to[1]);
+            dy -= on.every as i32;
+        }
+    }
+}
+
+/// [`raise_run`] of one sample, on samples, at the offsets along x that are given row by row.
+#[inline(always)]
+pub(super) fn raise_rows<V: Vectors>(
+    field: &Field,
+    on: &OnSamples,
+    [a, first]: [i64; 2],
+    rows: BoxRows,
+    bounds: impl Fn(usize) -> [i32; 2],
+    out: &mut Targets,
+) {
+    let origin = (first - on.shift) as i32;
     let z = V::splat(field.row(a)[PAD + first as usize]);
     let mut dy = rows.dy;
     for k in 0..rows.count {
-        if let Some(arc) = on.stencil.arc(i64::from(dy)) {
-            let [low, high] = match narrow {
-                Some(narrow) => {
-                    [narrow.low[k / LANES][k % LANES] as i32, narrow.high[k / LANES][k % LANES] as i32]
-                }
-                None => at.x,
-            };
-            let (lo, hi) = (low.max(arc.arc.lo), high.min(arc.arc.hi));
-            let start = (origin - i64::from(hi)).max(0) / LANES as i64 * LANES as i64;
-            let end = (origin - i64::from(lo) + 1).min(out.columns as i64);
-            if lo <= hi && start < end {
-                let length = ((end - start) as usize).next_multiple_of(LANES);
-                let s = &arc.values[arc.index((origin - start) as i32)..][..length];
-                let to = &mut out.row_mut(rows.first + k)[start as usize..][..length];
-                for (to, s) in groups_mut(to).iter_mut().zip(groups(s)) {
-                    V::store(V::greater(V::add(V::load(s), z), V::load(to)), to);
-                }
+        let arc = on.stencil.arc_there(dy);
+        let [low, high] = bounds(k);
+        let (lo, hi) = (low.max(arc.arc.lo), high.min(arc.arc.hi));
+        let start = (origin - hi).max(0) & -(LANES as i32);
+        let end = (origin - lo + 1).min(out.columns as i32);
+        if lo <= hi && start < end {
+            let length = ((end - start) as usize).next_multiple_of(LANES);
+            let s = &arc.values[arc.index(origin - start)..][..length];
+            let to = &mut out.row_mut(rows.first + k)[start as usize..][..length];
+            for (to, s) in groups_mut(to).iter_mut().zip(groups(s)) {
+                V::store(V::greater(V::add(V::load(s), z), V::load(to)), to);
             }
         }
         dy -= on.every as i32;

@@ -108,4 +108,10 @@ impl Stencil {
         let arc = *self.arcs.get(usize::try_from(k - self.first).ok()?)?;
         (arc.lo <= arc.hi).then_some(ArcRef { arc, values: &self.values })
     }
+
+    /// As [`Stencil::arc`], of a row that is within reach.
+    #[inline(always)]
+    pub fn arc_there(&self, k: i32) -> ArcRef<'_> {
+        ArcRef { arc: self.arcs[(i64::from(k) - self.first) as usize], values: &self.values }
+    }
 }

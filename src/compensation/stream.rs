@@ -1,4 +1,4 @@
-use super::{Profile, RowPass, cutter_location_rows, erode, machined_by_rows, residual};
+use super::{Profile, RowPass, cutter_location_rows_into, erode, machined_by_rows, residual};
 use crate::grid::{Heights, Lattice, Window};
 
 /// Samples of one band, about: what is held at once is a few bands and the cutter's reach.
@@ -71,6 +71,7 @@ fn by_rows<E>(
     // Rows of positions that are held, one in `every`, and the part's row of the first.
     let mut cut = Heights::empty(Window { columns: part.columns + 2 * halo, rows: 0, ..part.grown(halo) });
     let mut first = -((halo / every * every) as i64);
+    let mut more = Heights::empty(Window { columns: 0, rows: 0, ..part });
     for start in (0..part.rows).step_by(rows_at_once) {
         let band = Window { row: start as i64, rows: rows_at_once.min(part.rows - start), ..part };
         // Cut rows that this band needs beyond those held.
@@ -86,11 +87,10 @@ fn by_rows<E>(
         let low = around.row.min(band.row);
         let high = around.row_end().max(band.row_end());
         let h = read(Window { row: low, rows: (high - low) as usize, ..around })?;
-        let mut more = cutter_location_rows(&h, profile, wanted, every);
+        cutter_location_rows_into(&h, profile, wanted, every, &mut more);
         lift(&mut more)?;
         cut.z_mm.extend_from_slice(&more.z_mm);
         cut.window.rows += more.window.rows;
-        drop(more);
 
         let heights = h.crop(band);
         drop(h);

@@ -15,7 +15,7 @@ const TILE_COLUMNS: usize = 2048;
 const TILE_ROWS: [usize; 2] = [128, 4096];
 
 /// Rows that are held at once where they are not fed.
-const WHOLE_ROWS: usize = 512;
+const WHOLE_ROWS: usize = 1024;
 
 /// Radius of a flat bottom, in samples, from which chords are less work than single samples.
 const LEAST_CHORD: f64 = 2.0;
@@ -41,6 +41,18 @@ pub fn cutter_location_by(h: &Heights, profile: &Profile, out: Window, way: Way)
 /// `every` is at least 1.
 pub fn cutter_location_rows(h: &Heights, profile: &Profile, out: Window, every: usize) -> Heights {
     on_samples(h, profile, out, every.max(1), Sense::Raise, Way::Known)
+}
+
+/// As [`cutter_location_rows`], in the memory that `done` has: taking some anew, and giving it back,
+/// costs about as much as what is done to a sample under a small cutter.
+pub fn cutter_location_rows_into(
+    h: &Heights,
+    profile: &Profile,
+    out: Window,
+    every: usize,
+    done: &mut Heights,
+) {
+    on_samples_into(h, profile, out, every.max(1), Sense::Raise, Way::Known, done);
 }
 
 /// What a cutter standing at the locations `cl` (NaN: it does not stand there) leaves of a stock
@@ -70,13 +82,32 @@ pub fn residual(closing: &Heights, h: &Heights) -> Heights {
 }
 
 fn on_samples(h: &Heights, profile: &Profile, out: Window, every: usize, sense: Sense, way: Way) -> Heights {
+    let mut done = Heights { window: out, z_mm: Vec::new() };
+    on_samples_into(h, profile, out, every, sense, way, &mut done);
+    done
+}
+
+fn on_samples_into(
+    h: &Heights,
+    profile: &Profile,
+    out: Window,
+    every: usize,
+    sense: Sense,
+    way: Way,
+    done: &mut Heights,
+) {
     let rows = out.rows.div_ceil(every);
+    done.window = Window { rows, ..out };
     // Every sample is written below; zeros are memory that nobody has touched yet.
-    let mut done = Heights { window: Window { rows, ..out }, z_mm: vec![0.0; rows * out.columns] };
-    if out.columns == 0 || rows == 0 {
-        return done;
+    let samples = rows * out.columns;
+    if done.z_mm.capacity() < samples {
+        done.z_mm = vec![0.0; samples];
+        large_pages(&done.z_mm);
     }
-    large_pages(&done.z_mm);
+    done.z_mm.resize(samples, 0.0);
+    if samples == 0 {
+        return;
+    }
     let stencil = Stencil::new(profile, 0.0, 0.0);
     let columns = out.columns;
     // All about as wide, so that threads have equal shares.
@@ -104,7 +135,6 @@ fn on_samples(h: &Heights, profile: &Profile, out: Window, every: usize, sense: 
         };
         of.dilate(tile, &mut to, scratch);
     });
-    done
 }
 
 /// What is to be done on each tile: `tile.rows` rows, `every` apart.
