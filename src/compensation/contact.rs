@@ -28,10 +28,21 @@ use super::unboxed;
 const BLOCK_WORK: usize = 60;
 
 /// What bounding a row of samples one by one costs.
-const ROW_WORK: usize = 75;
+const ROW_WORK: usize = 90;
 
 /// What looking at far neighbours costs.
-const FAR_WORK: usize = 900;
+const FAR_WORK: usize = 800;
+
+/// What a sample on its own costs, and each target row that it may raise.
+const SINGLE_WORK: usize = 30;
+const SINGLE_ROW_WORK: usize = 10;
+const WIDE_ROW_WORK: usize = 22;
+
+/// What narrowing up to [`LANES`] rows of a box costs.
+const NARROW_WORK: usize = 70;
+
+/// Part of the work of taking every sample that the first rows may take more than their share.
+const ALLOWANCE: f64 = 0.01;
 
 /// Groups of lanes from which a sample's box is worth tightening by far neighbours.
 pub(super) const WIDE: f64 = 100.0;
@@ -86,20 +97,23 @@ pub(super) fn body<V: Vectors, P: Pairs>(
         whole: pairs.is_whole(),
         alike_mm: (0.4 * ball.step_mm / ball.radius) as f32,
         work: 0,
+        most: 0.0,
         known,
     };
     let rows = search.field.rows;
     for a in (0..rows).step_by(ROWS) {
-        let part = a as f64 / rows as f64;
-        if part > 0.015 && search.work as f64 > part * every_tap {
-            *given_up = true;
-            return;
-        }
         let count = ROWS.min(rows - a);
+        // Samples before the first target raise few.
+        let part = (((a + count) as f64 - ball.radius) / (rows as f64 - 2.0 * ball.radius)).clamp(0.0, 1.0);
+        search.most = (part + ALLOWANCE) * every_tap;
         if let Some(feed) = &mut feed {
             feed.before(a as i64, count, search.field, out);
         }
         search.rows(a as i64, count, out);
+        if search.work as f64 > search.most {
+            *given_up = true;
+            return;
+        }
         if let Some(feed) = &mut feed {
             feed.after((a + count) as i64, out);
         }
@@ -146,6 +160,8 @@ struct Search<'a, V: Vectors, P: Pairs> {
     alike_mm: f32,
     /// Done so far, in groups of lanes.
     work: usize,
+    /// At which looking for contacts is given up.
+    most: f64,
     /// By column of blocks, from the rows before: the facets of most samples.
     known: Vec<[Known; 2]>,
 }
@@ -183,6 +199,9 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
                 None => {
                     if self.in_reach(block, &all) {
                         self.split(block, out);
+                        if self.work as f64 > self.most {
+                            return;
+                        }
                     }
                 }
             }
@@ -392,10 +411,11 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
         if let Some(on) = self.pairs.on_samples() {
             let offsets = self.boxes.offsets(at[0], at[1]);
             let rows = BoxRows::of(on, a, &offsets);
+            self.work += SINGLE_WORK;
             if rows.count > 0 {
                 let wide = offsets.x[1] - offsets.x[0];
                 if wide < LANES as i32 {
-                    self.work += 8 * rows.count;
+                    self.work += SINGLE_ROW_WORK * rows.count;
                     raise_narrow::<V>(self.field, on, [a, first as i64], rows, offsets.x, out);
                 } else {
                     let at = self.boxes.at(at[0], at[1]);
@@ -437,7 +457,7 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
         let of_rows = |rows: BoxRows| [rows.dy, every, rows.count as i32];
         let mut groups = self.row_bounds.fill::<V>(&rises, &self.ball, &at, of_rows(rows));
         if groups as f64 > WIDE {
-            self.work += FAR_WORK;
+            self.work += FAR_WORK + NARROW_WORK * (1 + rows.count / LANES);
             match self.ball.far_neighbours(self.field, a, PAD + first as usize, at) {
                 None => return,
                 Some(tighter) => at = tighter,
@@ -445,7 +465,7 @@ impl<V: Vectors, P: Pairs> Search<'_, V, P> {
             rows = BoxRows::of(on, a, &Offsets::of(&at));
             groups = self.row_bounds.fill::<V>(&rises, &self.ball, &at, of_rows(rows));
         }
-        self.work += groups + 6 * rows.count;
+        self.work += groups + WIDE_ROW_WORK * rows.count + NARROW_WORK * (1 + rows.count / LANES);
         let of = &self.row_bounds;
         let bounds = |k: usize| [of.low[k / LANES][k % LANES] as i32, of.high[k / LANES][k % LANES] as i32];
         raise_rows::<V>(self.field, on, [a, first], rows, bounds, out);

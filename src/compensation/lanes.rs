@@ -328,14 +328,6 @@ pub(super) fn groups_mut(z: &mut [f32]) -> &mut [[f32; LANES]] {
     z.as_chunks_mut().0
 }
 
-/// out = max(out, a, b), over whole groups.
-#[inline(always)]
-pub(super) fn raise_both<V: Vectors>(out: &mut [f32], a: &[f32], b: &[f32]) {
-    for ((out, a), b) in groups_mut(out).iter_mut().zip(groups(a)).zip(groups(b)) {
-        V::store(V::greater(V::greater(V::load(a), V::load(b)), V::load(out)), out);
-    }
-}
-
 /// out = max(a, b), over whole groups.
 #[inline(always)]
 pub(super) fn higher<V: Vectors>(out: &mut [f32], a: &[f32], b: &[f32]) {
