@@ -14,14 +14,17 @@
 
 use super::Profile;
 use super::ball::{Ball, Reachable};
-use super::blocks::{Block, Boxes, Lanes, Moderate, ROWS, RowBounds, measure};
+use super::blocks::{Block, Lanes, ROWS, measure};
+use super::boxes::Boxes;
 use super::feed::Feed;
 use super::field::{Field, PAD, Targets};
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors, widest};
 use super::pairs::Pairs;
+use super::rim::RowBounds;
 use super::runs::{BoxRows, Offsets, Run, Span, raise_narrow, raise_rows, raise_run, raise_spans, row_work};
 use super::slopes::Rises;
+use super::sweep::Moderate;
 use super::unboxed;
 
 /// What raising targets by blocks of one box costs besides, in groups of lanes.
