@@ -46,9 +46,9 @@ impl<V: Vectors> Boxes<V> {
         let sweeper = Sweeper::<V>::new(ball);
         // Nothing is steeper than what moderate slopes are, without any.
         let steepest = V::splat(moderate.as_ref().map_or(-1.0, |moderate| moderate.steepest));
-        for r in 0..ROWS {
+        for (r, &bits) in of.iter().enumerate() {
             self.boxed[r] = 0;
-            if of[r] == 0 {
+            if bits == 0 {
                 continue;
             }
             self.bounded += 1;
@@ -58,8 +58,8 @@ impl<V: Vectors> Boxes<V> {
             let y_before = V::multiply(V::load(&lanes.y_before[r]), scale);
             let x_size = V::greater(size::<V>(x_next), size::<V>(x_before));
             let y_size = V::greater(size::<V>(y_next), size::<V>(y_before));
-            let of_moderate = of[r] & V::at_least(steepest, V::greater(x_size, y_size));
-            let steep = of[r] & !of_moderate;
+            let of_moderate = bits & V::at_least(steepest, V::greater(x_size, y_size));
+            let steep = bits & !of_moderate;
             if let Some(moderate) = moderate
                 && of_moderate != 0
             {
