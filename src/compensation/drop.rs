@@ -7,6 +7,7 @@
 
 use super::facets::Facets;
 use super::meridian::Meridian;
+use super::ridges::{down, up};
 use super::touch::{Band, Rest, Stretch};
 use super::{Profile, RowTarget};
 use crate::grid::Heights;
@@ -75,7 +76,8 @@ struct Member {
     nth: u32,
 }
 
-type Places = [[f64; 2]; 2];
+/// Lowest and highest place in x and y.
+type Places = [[f32; 2]; 2];
 
 impl<'a> Faces<'a> {
     pub fn new(facets: &'a Facets, profile: &Profile) -> Faces<'a> {
@@ -99,26 +101,30 @@ impl<'a> Faces<'a> {
     }
 
     /// Where the axis may stand on each face and edge.
-    fn places(&self) -> impl Iterator<Item = Places> {
+    fn places(&self) -> Vec<Places> {
         let faces = self.facets.faces.iter().zip(&self.rests);
         let faces = faces.map(|(face, rest)| rest.places(self.facets.corners_of(face)));
-        faces.chain(self.facets.ridges.iter().zip(&self.bands).map(|(r, band)| band.places(r, self.facets)))
+        let ridges = self.facets.ridges.iter().zip(&self.bands);
+        let all = faces.chain(ridges.map(|(ridge, band)| band.places(ridge, self.facets)));
+        all.map(|places| places.map(|[low, high]| [down(low), up(high)])).collect()
     }
 
     fn index(&mut self) {
         let (mut low_mm, mut high_mm) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        let (mut sum_mm, mut count) = ([0.0; 2], 0.0);
-        for places in self.places() {
-            for axis in 0..2 {
-                low_mm[axis] = low_mm[axis].min(places[axis][0]);
-                high_mm[axis] = high_mm[axis].max(places[axis][1]);
-                sum_mm[axis] += places[axis][1] - places[axis][0];
-            }
-            count += 1.0;
-        }
-        if count == 0.0 {
+        let mut sum_mm = [0.0; 2];
+        let all = self.places();
+        if all.is_empty() {
             return;
         }
+        for places in &all {
+            for axis in 0..2 {
+                let [low, high] = places[axis].map(f64::from);
+                low_mm[axis] = low_mm[axis].min(low);
+                high_mm[axis] = high_mm[axis].max(high);
+                sum_mm[axis] += high - low;
+            }
+        }
+        let count = all.len() as f64;
         self.low_mm = low_mm;
         let size_mm = [0, 1].map(|axis| high_mm[axis] - low_mm[axis]);
         self.cell_mm = [0, 1].map(|axis| (CELL[axis] * sum_mm[axis] / count).max(1e-6));
@@ -130,8 +136,8 @@ impl<'a> Faces<'a> {
             self.cells = [0, 1].map(|axis| (size_mm[axis] / self.cell_mm[axis]).floor() as usize + 1);
             let mut counts = vec![0u32; self.cells[0] * self.cells[1] + 1];
             let mut held = 0;
-            for places in self.places() {
-                self.each_cell(&places, |cell| {
+            for places in &all {
+                self.each_cell(places, |cell| {
                     counts[cell + 1] = counts[cell + 1].saturating_add(1);
                     held += 1;
                 });
@@ -148,14 +154,10 @@ impl<'a> Faces<'a> {
         let mut next = counts.clone();
         let mut members =
             vec![Member { low_mm: 0.0, high_mm: 0.0, nth: 0 }; counts[counts.len() - 1] as usize];
-        for (nth, places) in self.places().enumerate() {
+        for (nth, places) in all.iter().enumerate() {
             let [low_mm, high_mm] = places[1];
-            let member = Member {
-                low_mm: (low_mm as f32).next_down(),
-                high_mm: (high_mm as f32).next_up(),
-                nth: nth as u32,
-            };
-            self.each_cell(&places, |cell| {
+            let member = Member { low_mm, high_mm, nth: nth as u32 };
+            self.each_cell(places, |cell| {
                 members[next[cell] as usize] = member;
                 next[cell] += 1;
             });
@@ -172,9 +174,9 @@ impl<'a> Faces<'a> {
     fn each_cell(&self, places: &Places, mut tell: impl FnMut(usize)) {
         let [columns, rows]: [RangeInclusive<usize>; 2] = [0, 1].map(|axis| {
             let last = self.cells[axis] - 1;
-            let cell = |mm: f64| {
-                let at = ((mm - self.low_mm[axis]) / self.cell_mm[axis]).floor();
-                (at.max(0.0) as usize).min(last)
+            let cell = |mm: f32| {
+                let at = (f64::from(mm) - self.low_mm[axis]) / self.cell_mm[axis];
+                (at as usize).min(last)
             };
             cell(places[axis][0])..=cell(places[axis][1])
         });
@@ -187,7 +189,7 @@ impl<'a> Faces<'a> {
 
     /// Place of a coordinate among the cells of an axis; None outside.
     fn cell(&self, axis: usize, mm: f64) -> Option<usize> {
-        let at = ((mm - self.low_mm[axis]) / self.cell_mm[axis]).floor();
+        let at = (mm - self.low_mm[axis]) / self.cell_mm[axis];
         (at >= 0.0 && at < self.cells[axis] as f64).then_some(at as usize)
     }
 

@@ -152,7 +152,7 @@ impl<'a> Around<'a> {
             }
             let (a, b) = (self.place(from.min(to)), self.place(from.max(to)));
             let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-            let length = dx.hypot(dy);
+            let length = (dx * dx + dy * dy).sqrt();
             if length <= SAME_MM {
                 let lower = if a[2] < b[2] { from.min(to) } else { from.max(to) };
                 self.points[lower as usize].under = true;

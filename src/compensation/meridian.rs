@@ -115,7 +115,8 @@ impl Meridian {
         let most = across[0].abs().max(across[1].abs());
         let least =
             if across[0] <= 0.0 && across[1] >= 0.0 { 0.0 } else { across[0].abs().min(across[1].abs()) };
-        let (shallow, steep) = (slope.hypot(least), slope.hypot(most));
+        let squares = [least, most].map(|across| slope * slope + across * across);
+        let [shallow, steep] = squares.map(f64::sqrt);
         let round = |k: f64| self.flat / k + self.arc / (1.0 + k * k).sqrt();
         let cone = self.cone.unwrap_or(f64::INFINITY);
         let before = shallow <= cone * (1.0 + ROUNDING);

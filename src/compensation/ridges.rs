@@ -51,7 +51,7 @@ struct Line {
 impl Line {
     fn new(a: &[f64; 3], b: &[f64; 3]) -> Line {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-        let length = dx.hypot(dy);
+        let length = (dx * dx + dy * dy).sqrt();
         let along = [dx / length, dy / length];
         Line { along, across: [-along[1], along[0]], length, slope: (b[2] - a[2]) / length }
     }

@@ -25,9 +25,13 @@ pub(super) struct Stretch<'a> {
 impl Stretch<'_> {
     /// Positions between two places.
     fn between(&self, [low_mm, high_mm]: [f64; 2]) -> Range<usize> {
-        let at = |mm: f64| (mm - self.x_mm[0]) / self.pitch_mm;
-        let first = at(low_mm).ceil().max(0.0) as usize;
-        let end = ((at(high_mm).floor() + 1.0).max(0.0) as usize).min(self.x_mm.len());
+        let [low, high] = [low_mm, high_mm].map(|mm| (mm - self.x_mm[0]) / self.pitch_mm);
+        if !(high >= 0.0 && low < self.x_mm.len() as f64) {
+            return 0..0;
+        }
+        let first = low as usize;
+        let first = if low > first as f64 { first + 1 } else { first };
+        let end = (high as usize).saturating_add(1).min(self.x_mm.len());
         first.min(end)..end
     }
 }
@@ -44,7 +48,7 @@ pub(super) struct Rest {
 impl Rest {
     pub(super) fn new(face: &Face, meridian: &Meridian) -> Rest {
         let [gx, gy] = face.gradient;
-        let slope = gx.hypot(gy);
+        let slope = (gx * gx + gy * gy).sqrt();
         let r_mm = meridian.contact_mm(slope);
         let along = if slope > 0.0 { r_mm / slope } else { 0.0 };
         let above = slope * r_mm + meridian.s_mm(r_mm * r_mm).unwrap_or(0.0);
@@ -217,29 +221,34 @@ impl Edge<'_> {
         } else {
             for (x_mm, now) in x_mm.iter().zip(now) {
                 let (foot, off) = self.foot(dy, *x_mm);
-                if let Some(z_mm) = self.height(foot, off * off, meridian)
-                    && z_mm > *now
-                {
-                    *now = z_mm;
-                }
+                *now = self.height(foot, off * off, meridian, *now);
             }
         }
     }
 
-    /// The cutter's height on the edge with its axis off it by a distance (squared).
-    fn height(&self, foot: f64, off2: f64, meridian: &Meridian) -> Option<f64> {
+    /// The cutter's height on the edge with its axis off it by a distance (squared), or `now` where that is higher.
+    fn height(&self, foot: f64, off2: f64, meridian: &Meridian, now: f64) -> f64 {
         let reach = meridian.reach_mm();
         let half = (reach * reach - off2).max(0.0).sqrt();
         let (low, high) = ((-foot).max(-half), (self.length - foot).min(half));
+        let at = |u: f64, rise: f64| {
+            let s_mm = meridian.s_mm(off2 + u * u).unwrap_or(f64::NEG_INFINITY);
+            self.a[2] + self.slope * foot + rise + s_mm
+        };
+        // Nowhere higher than nearest to the axis but for the edge's own rise.
+        let rises =
+            |low: f64, high: f64| at(0f64.clamp(low, high), (self.slope * low).max(self.slope * high)) > now;
         let u = if low > high {
             // An end that lies on the cutter's rim but for rounding, or out of reach.
             if foot < 0.0 { -foot } else { self.length - foot }
+        } else if !rises(low, high) {
+            return now;
         } else if self.slope < 0.0 {
             // Mirrored where the edge falls.
             -meridian.along_mm(off2, -self.slope, -high, -low)
         } else {
             meridian.along_mm(off2, self.slope, low, high)
         };
-        meridian.s_mm(off2 + u * u).map(|s_mm| self.a[2] + self.slope * (foot + u) + s_mm)
+        at(u, self.slope * u).max(now)
     }
 }
