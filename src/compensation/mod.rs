@@ -41,6 +41,7 @@ mod slopes;
 mod stencil;
 mod stream;
 mod sweep;
+mod tables;
 mod tiles;
 mod touch;
 mod unboxed;
@@ -48,10 +49,11 @@ mod weld;
 
 pub use drop::{Faces, lift};
 pub use facets::Facets;
-pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows};
+pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows, rows_by};
 pub use places::Places;
 pub use profile::Profile;
 pub use stream::{Band, stream, stream_bytes};
+pub use tables::Tables;
 #[doc(hidden)]
 pub use tiles::{Way, cutter_location_by};
 pub use tiles::{closing, cutter_location, cutter_location_rows, cutter_location_rows_into, erode, residual};

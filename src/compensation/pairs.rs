@@ -1,5 +1,6 @@
 use super::stencil::{ArcRef, Stencil};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Which input row touches which row of cutter positions, and with what arc. Input row `a` and
 /// target row `b` are counted from 0 in their field; sample `i` of row `a` lies under position
@@ -123,7 +124,7 @@ fn ceil_div(a: i64, b: i64) -> i64 {
 
 /// Rows at any y and x offset over lattice samples: a planner's passes on its controller's grid.
 pub(super) struct OverSamples<'a> {
-    pub stencils: &'a [Stencil],
+    pub stencils: &'a [Arc<Stencil>],
     pub rows: &'a [TargetRow],
     pub reach: i64,
     pub input_rows: i64,
@@ -182,7 +183,7 @@ impl Pairs for OverSamples<'_> {
 /// Lattice samples under passes: the passes are the input and the samples the targets; profiles
 /// are round, so which of the two stands on the axis is all one.
 pub(super) struct UnderPasses<'a> {
-    pub stencils: &'a [Stencil],
+    pub stencils: &'a [Arc<Stencil>],
     pub passes: &'a [PassRow],
     pub reach: i64,
     pub target_row: i64,

@@ -1,10 +1,11 @@
-use super::Profile;
 use super::field::{Field, PAD, Sense, Targets};
 use super::pairs::{OverSamples, PassRow, TargetRow, UnderPasses};
 use super::stencil::Stencil;
 use super::tiles::dilate;
+use super::{Profile, Tables};
 use crate::grid::{Heights, Window};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Positions along one row of a planner's or a controller's grid: x0_mm + i step, at y_mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +24,7 @@ pub struct RowPass<'a> {
     pub z_mm: &'a [f32],
 }
 
-/// Rows that are worked on together; their stencils are held at once.
+/// Rows that are worked on together.
 const BATCH: usize = 32;
 
 /// Columns of samples of one tile.
@@ -53,6 +54,12 @@ pub fn row(h: &Heights, profile: &Profile, x0_mm: f64, y_mm: f64, count: usize) 
 
 /// [`row`] for many rows, in any order; neighbouring rows share their work, so give many.
 pub fn rows(h: &Heights, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+    rows_by(h, &Tables::new(*profile), targets)
+}
+
+/// [`rows`] with tables that last longer than a call.
+pub fn rows_by(h: &Heights, tables: &Tables, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+    let profile = tables.profile();
     let step_mm = profile.step_mm();
     let mut order: Vec<usize> = (0..targets.len()).collect();
     order.sort_by(|&i, &j| targets[i].y_mm.total_cmp(&targets[j].y_mm).then(i.cmp(&j)));
@@ -78,7 +85,7 @@ pub fn rows(h: &Heights, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f3
                     (i, RowTarget { x0_mm: t.x0_mm + from as f64 * step_mm, y_mm: t.y_mm, count })
                 })
                 .collect();
-            let z = few_rows(h, profile, &parts.iter().map(|p| p.1).collect::<Vec<_>>());
+            let z = few_rows(h, tables, &parts.iter().map(|p| p.1).collect::<Vec<_>>());
             parts.iter().zip(z).map(|((i, _), z)| (*i, from, z)).collect()
         })
         .collect();
@@ -90,10 +97,11 @@ pub fn rows(h: &Heights, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f3
 }
 
 /// Rows in order of y.
-fn few_rows(h: &Heights, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+fn few_rows(h: &Heights, tables: &Tables, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+    let profile = tables.profile();
     let step_mm = profile.step_mm();
     let reach = profile.reach() as i64;
-    let mut stencils: Vec<Stencil> = Vec::new();
+    let mut stencils = Vec::new();
     let mut rows = Vec::with_capacity(targets.len());
     let (mut left, mut right) = (i64::MAX, i64::MIN);
     let mut at = Vec::with_capacity(targets.len());
@@ -107,7 +115,7 @@ fn few_rows(h: &Heights, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f3
     let halo = reach + 2;
     for (column, row, x, y) in at {
         // Sample less axis: the axis stands x right of and y above its sample.
-        let stencil = shared_stencil(&mut stencils, profile, 0.0 - x, 0.0 - y);
+        let stencil = shared_stencil(&mut stencils, tables, 0.0 - x, 0.0 - y);
         rows.push(TargetRow { stencil, row, shift: halo + column - left, y: row as f64 + y });
     }
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Vec::new() };
@@ -137,11 +145,11 @@ fn few_rows(h: &Heights, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f3
         .collect()
 }
 
-fn shared_stencil(stencils: &mut Vec<Stencil>, profile: &Profile, fx: f64, fy: f64) -> usize {
+fn shared_stencil(stencils: &mut Vec<Arc<Stencil>>, tables: &Tables, fx: f64, fy: f64) -> usize {
     match stencils.iter().position(|s| s.fx == fx && s.fy == fy) {
         Some(at) => at,
         None => {
-            stencils.push(Stencil::new(profile, fx, fy));
+            stencils.push(tables.at(fx, fy));
             stencils.len() - 1
         }
     }
@@ -188,6 +196,7 @@ pub fn machined_by_rows(passes: &[RowPass], profile: &Profile, out: Window) -> H
     if out.columns == 0 || out.rows == 0 {
         return done;
     }
+    let tables = Tables::new(*profile);
     let mut order: Vec<&RowPass> = passes.iter().collect();
     order.sort_by(|p, q| p.y_mm.total_cmp(&q.y_mm));
     let tile_rows = TILE_ROWS.max(2 * reach as usize);
@@ -201,7 +210,7 @@ pub fn machined_by_rows(passes: &[RowPass], profile: &Profile, out: Window) -> H
         for column in (0..columns).step_by(TILE_COLUMNS) {
             let width = TILE_COLUMNS.min(columns - column);
             let tile = Window { column: out.column + column as i64, row, columns: width, rows };
-            let targets = tile_under_passes(&order[low..high], profile, tile);
+            let targets = tile_under_passes(&order[low..high], &tables, tile);
             for row in 0..rows {
                 let to = &mut z_mm[row * columns + column..][..width];
                 for (to, z) in to.iter_mut().zip(targets.row(row)) {
@@ -213,7 +222,8 @@ pub fn machined_by_rows(passes: &[RowPass], profile: &Profile, out: Window) -> H
     done
 }
 
-fn tile_under_passes(passes: &[&RowPass], profile: &Profile, tile: Window) -> Targets {
+fn tile_under_passes(passes: &[&RowPass], tables: &Tables, tile: Window) -> Targets {
+    let profile = tables.profile();
     let step_mm = profile.step_mm();
     let reach = profile.reach() as i64;
     let halo = reach + 2;
@@ -224,7 +234,7 @@ fn tile_under_passes(passes: &[&RowPass], profile: &Profile, tile: Window) -> Ta
     for (a, pass) in passes.iter().enumerate() {
         let (column, x) = split(pass.x0_mm, step_mm);
         let (row, y) = split(pass.y_mm, step_mm);
-        rows.push(PassRow { stencil: shared_stencil(&mut stencils, profile, x, y), row });
+        rows.push(PassRow { stencil: shared_stencil(&mut stencils, tables, x, y), row });
         let to = field.row_mut(a);
         let offset = column - (tile.column - halo);
         let skip = (-offset).max(0) as usize;

@@ -102,6 +102,10 @@ impl Stencil {
         Stencil { fx, fy, first: -reach, arcs, values, slack_mm: 4.0 * deepest.abs() * f32::EPSILON }
     }
 
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.values.as_slice()) + size_of_val(self.arcs.as_slice())
+    }
+
     /// The samples k rows above the axis.
     #[inline(always)]
     pub fn arc(&self, k: i64) -> Option<ArcRef<'_>> {

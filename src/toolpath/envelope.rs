@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use super::passes::{Layout, tip_radius_mm};
 use super::strip::{Ceiling, Strip};
-use crate::compensation::{self, Faces, Profile, RowTarget};
+use crate::compensation::{self, Faces, Profile, RowTarget, Tables};
 use crate::cutter::Shape;
 use crate::tolerance::Budget;
 
@@ -36,8 +36,8 @@ const STEEP_BLOCK: usize = 256;
 
 /// A cutter as the planner asks about it.
 pub(super) struct Cutter {
-    pub(super) exact: Profile,
-    pub(super) wide: Profile,
+    pub(super) exact: Tables,
+    pub(super) wide: Tables,
     pub(super) radius_mm: f64,
     tip_mm: f64,
     /// Farthest contact from the tip's centre that is still on the round part.
@@ -87,8 +87,8 @@ impl Cutter {
             _ => tip_mm,
         };
         Ok(Cutter {
-            exact: Profile::new(shape, step_mm, 0.0)?,
-            wide: Profile::new(shape, step_mm, allowance_mm)?,
+            exact: Tables::new(Profile::new(shape, step_mm, 0.0)?),
+            wide: Tables::new(Profile::new(shape, step_mm, allowance_mm)?),
             radius_mm: shape.radius_mm(),
             tip_mm,
             round_mm,
@@ -108,7 +108,8 @@ impl Cutter {
         passes: Range<usize>,
     ) -> Vec<Envelope> {
         let across = passes.clone().map(|k| layout.across_mm(k));
-        let exact = self.rows(strip, &self.exact, &Faces::new(&strip.facets, &self.exact), layout, across);
+        let faces = Faces::new(&strip.facets, self.exact.profile());
+        let exact = self.rows(strip, &self.exact, &faces, layout, across);
         if self.tip_mm <= 0.0 {
             let mut envelopes = self.widened(strip, wide, layout, passes);
             envelopes.par_iter_mut().zip(exact).for_each(|(envelope, cl_mm)| envelope.cl_mm = cl_mm);
@@ -264,59 +265,28 @@ impl Cutter {
             .collect()
     }
 
-    /// Lowest height in mm at which the cutter may go straight from one place to another (along,
-    /// across); None where nothing is in reach, so that nothing is known of what stands there.
-    pub(super) fn straight(
-        &self,
-        strip: &Strip,
-        wide: &Faces,
-        from_mm: [f64; 2],
-        to_mm: [f64; 2],
-    ) -> Option<f64> {
-        let (du, dv) = (to_mm[0] - from_mm[0], to_mm[1] - from_mm[1]);
-        let steps = (du.hypot(dv) / self.pitch_mm).ceil().max(1.0);
-        let places: Vec<[f64; 2]> = (0..=steps as usize)
-            .map(|i| {
-                let t = i as f64 / steps;
-                [from_mm[0] + t * du, from_mm[1] + t * dv]
-            })
-            .collect();
-        let drops = compensation::points(&strip.heights, &self.wide, &places);
-        if drops.iter().any(|z| z.is_nan()) {
-            return None;
-        }
-        let lifted = places.iter().zip(drops).map(|(&place, z_mm)| wide.lift_point(place, z_mm));
-        Some(lifted.fold(f64::NEG_INFINITY, f64::max))
-    }
-
     /// The faces of a strip as the widened cutter meets them.
     pub(super) fn faces<'a>(&self, strip: &'a Strip) -> Faces<'a> {
-        Faces::new(&strip.facets, &self.wide)
+        Faces::new(&strip.facets, self.wide.profile())
     }
 
-    /// Locations of a profile along rows like those of the layout, at other places across; never below the
-    /// drop on the profile's `faces`.
+    /// Locations along rows like those of the layout, at other places across; never below the drop on the
+    /// `faces` of the same cutter.
     pub(super) fn rows(
         &self,
         strip: &Strip,
-        profile: &Profile,
+        tables: &Tables,
         faces: &Faces,
         layout: &Layout,
         across_mm: impl Iterator<Item = f64>,
     ) -> Vec<Vec<f32>> {
         let targets: Vec<RowTarget> =
             across_mm.map(|y_mm| RowTarget { x0_mm: layout.start_mm(), y_mm, count: layout.count }).collect();
-        self.targets(strip, profile, faces, &targets)
+        self.targets(strip, tables, faces, &targets)
     }
 
-    fn targets(
-        &self,
-        strip: &Strip,
-        profile: &Profile,
-        faces: &Faces,
-        targets: &[RowTarget],
-    ) -> Vec<Vec<f32>> {
-        let mut rows = self.sampled(strip, profile, targets);
+    fn targets(&self, strip: &Strip, tables: &Tables, faces: &Faces, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+        let mut rows = self.sampled(strip, tables, targets);
         if !faces.is_empty() {
             rows.par_iter_mut()
                 .zip(targets)
@@ -325,9 +295,10 @@ impl Cutter {
         rows
     }
 
-    fn sampled(&self, strip: &Strip, profile: &Profile, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+    fn sampled(&self, strip: &Strip, tables: &Tables, targets: &[RowTarget]) -> Vec<Vec<f32>> {
+        let profile = tables.profile();
         if (self.pitch_mm - profile.step_mm()).abs() < 1e-9 {
-            return compensation::rows(&strip.heights, profile, targets);
+            return compensation::rows_by(&strip.heights, tables, targets);
         }
         let place = |t: &RowTarget, i: usize| [t.x0_mm + i as f64 * self.pitch_mm, t.y_mm];
         targets

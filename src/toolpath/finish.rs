@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::envelope::{Cutter, Envelope};
+use super::ground::Ground;
 use super::passes::{contact_radius_mm, tip_radius_mm};
 use super::pen::Pen;
 use super::strip::{Strip, band_length};
@@ -163,9 +164,9 @@ fn passes(
         let low_mm = layout.across_mm(first) - longest_mm;
         let read = || Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), cutter.reach_mm);
         let strip = if slanted { None } else { Some(read()?) };
-        let ground = strip.as_ref().map(|strip| (strip, cutter.faces(strip)));
+        let ground = strip.as_ref().map(|strip| Ground::new(strip, &cutter));
         let envelopes = match &ground {
-            Some((strip, faces)) => cutter.envelopes(strip, faces, &layout, first..last + 1),
+            Some(ground) => cutter.envelopes(ground.strip, &ground.wide, &layout, first..last + 1),
             None => slant::envelopes(site, &cutter, &layout, first..last + 1)?,
         };
         let planned: Vec<(Vec<Run>, Tilt)> = (first..last + 1)
@@ -190,9 +191,9 @@ fn passes(
             .par_iter()
             .map(|&(from, to)| match &ground {
                 _ if params.pattern == Pattern::OneWay => Ok(None),
-                Some((strip, faces)) => {
+                Some(ground) => {
                     let leave_mm = params.stock_to_leave_mm;
-                    Ok(link::level(site, &cutter, strip, faces, from, to, leave_mm, longest_mm))
+                    Ok(link::level(site, &cutter, ground, from, to, leave_mm, longest_mm))
                 }
                 None => {
                     let leave_mm = params.stock_to_leave_mm;

@@ -1,21 +1,19 @@
 //! Links of a zigzag that stay down, only where that is proved safe.
 
 use super::envelope::Cutter;
+use super::ground::Ground;
 use super::strip::Strip;
 use super::{Axis, Error, GridPoint, Site};
-use crate::compensation::Faces;
 
 /// Longer ways than this many stepovers are travelled on the clearance plane.
 pub(super) const LONGEST_STEPOVERS: f64 = 4.0;
 
 /// Height in units of a level link from one place to another (along, across, units), or None where
 /// the way is too long, too high to be worth it, or leads past what is known.
-#[allow(clippy::too_many_arguments)]
 pub(super) fn level(
     site: &Site,
     cutter: &Cutter,
-    strip: &Strip,
-    wide: &Faces,
+    ground: &Ground,
     from: GridPoint,
     to: GridPoint,
     leave_mm: f64,
@@ -26,7 +24,7 @@ pub(super) fn level(
     if (b[0] - a[0]).hypot(b[1] - a[1]) > longest_mm {
         return None;
     }
-    let lowest_mm = cutter.straight(strip, wide, a, b)? + leave_mm;
+    let lowest_mm = ground.straight(cutter, a, b)? + leave_mm;
     let z = site.unit_above(lowest_mm).max(from[2]).max(to[2]);
     (z <= site.unit_above(site.top_allowance_mm)).then_some(z)
 }
@@ -50,5 +48,5 @@ pub(super) fn elsewhere(
     let reach_mm = cutter.reach_mm;
     let strip =
         Strip::around(site.surface, along, low_mm.map(|mm| mm - reach_mm), high_mm.map(|mm| mm + reach_mm))?;
-    Ok(level(site, cutter, &strip, &cutter.faces(&strip), from, to, leave_mm, longest_mm))
+    Ok(level(site, cutter, &Ground::new(&strip, cutter), from, to, leave_mm, longest_mm))
 }

@@ -14,6 +14,7 @@ mod ends;
 mod envelope;
 pub mod finish;
 mod funnel;
+mod ground;
 mod levels;
 mod link;
 mod passes;

@@ -13,7 +13,7 @@ use super::pen::Pen;
 use super::ramp::ramp;
 use super::strip::{Border, Strip, band_length};
 use super::{Axis, Error, Layout, Progress, Site, Toolpath, funnel};
-use crate::compensation::{self, Faces};
+use crate::compensation::{self, Faces, Tables};
 use crate::cutter::Shape;
 
 /// How far a roughing profile may stand above what is left for it, in mm besides a grid unit: what is
@@ -152,7 +152,7 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
     let coarse = ((0.25 * stepover_mm / site.unit_mm) as i32 / layout.pitch).max(1) * layout.pitch;
     // At the middle between two rows, widened so that it answers for both and for the next place.
     let between_mm = (0.5 * stepover_mm).hypot(0.5 * layout.pitch_mm()) + site.budget.path_tolerance_mm;
-    let between = compensation::Profile::new(params.shape, lattice.step_mm, between_mm)?;
+    let between = Tables::new(compensation::Profile::new(params.shape, lattice.step_mm, between_mm)?);
     let reach_mm = cutter.reach_mm + between_mm;
     let border = Border::read(site.surface, layout.along, params.clear_mm.max(lattice.step_mm))?;
     let mut rows: Vec<Row> = Vec::with_capacity(layout.passes.len());
@@ -163,7 +163,7 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
         let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), reach_mm)?;
         let envelopes = cutter.widened(&strip, &cutter.faces(&strip), &layout, first..last + 1);
         let middles = (first..last + 1).map(|k| layout.across_mm(k) - 0.5 * stepover_mm);
-        let faces = Faces::new(&strip.facets, &between);
+        let faces = Faces::new(&strip.facets, between.profile());
         let between = cutter.rows(&strip, &between, &faces, &layout, middles);
         let band: Vec<Row> = (first..last + 1)
             .into_par_iter()

@@ -55,7 +55,7 @@ pub(super) fn envelopes(
         let block = Block {
             cutter,
             layout,
-            exact: Faces::new(&strip.facets, &cutter.exact),
+            exact: Faces::new(&strip.facets, cutter.exact.profile()),
             wide: cutter.faces(&strip),
             places: Places::new(&strip.heights, site.surface.lattice().step_mm),
             missed_mm: strip.missed_mm,
@@ -85,7 +85,7 @@ impl Block<'_> {
                 continue;
             }
             let place = self.layout.turned_mm(k, i);
-            let sampled = self.places.drop_mm(&self.cutter.exact, place, &mut near);
+            let sampled = self.places.drop_mm(self.cutter.exact.profile(), place, &mut near);
             let z_mm = self.exact.lift_point(place, sampled);
             if z_mm.is_finite() {
                 envelope.cl_mm[i] = z_mm as f32;
@@ -128,6 +128,6 @@ impl Block<'_> {
 
     fn widened(&self, k: usize, i: usize, near: &mut Option<[usize; 2]>) -> f64 {
         let place = self.layout.turned_mm(k, i);
-        self.wide.lift_point(place, self.places.drop_mm(&self.cutter.wide, place, near))
+        self.wide.lift_point(place, self.places.drop_mm(self.cutter.wide.profile(), place, near))
     }
 }
