@@ -201,9 +201,9 @@ impl<'a> Around<'a> {
             match gradient {
                 Some(g) if shallowest_mm > 0.0 => {
                     let slack = slack(g, shallowest_mm);
-                    for axis in 0..2 {
-                        point.low[axis] = point.low[axis].min(g[axis] - slack);
-                        point.high[axis] = point.high[axis].max(g[axis] + slack);
+                    for (axis, g) in g.into_iter().enumerate() {
+                        point.low[axis] = point.low[axis].min(g - slack);
+                        point.high[axis] = point.high[axis].max(g + slack);
                     }
                 }
                 _ => point.open = true,
