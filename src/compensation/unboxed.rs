@@ -15,6 +15,9 @@ use super::slopes::{CELL, Rises, RowRises};
 /// Cells of a row that are first tried as one run.
 const CELLS: usize = 4;
 
+/// What bounds samples along their row, and the targets that they can touch.
+type Bounded = (Beside, Range<usize>);
+
 /// Offsets up to which a run is not split.
 const CHEAP: i32 = 6;
 
@@ -53,8 +56,8 @@ pub(super) fn contacts<V: Vectors, P: Pairs>(
             let first = block * CELLS * CELL;
             let beside = |rises: &Rises| Beside::new(rises, ball.step_mm, ball.slack_mm);
             let whole = beside(&all);
-            let mut parts: Option<[(Beside, Range<usize>); CELLS]> = None;
-            let mut singles: [Option<[(Beside, Range<usize>); CELL]>; CELLS] = Default::default();
+            let mut parts: Option<[Bounded; CELLS]> = None;
+            let mut singles: [Option<[Bounded; CELL]>; CELLS] = Default::default();
             for b in near {
                 let Some(arc) = pairs.arc(a, b) else { continue };
                 let [lo, hi] = whole.interval(&arc);

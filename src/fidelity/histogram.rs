@@ -38,8 +38,8 @@ impl Histogram {
         let mut bins = [0u32; TOGETHER];
         for quanta in quanta.chunks(TOGETHER) {
             for (bin, quanta) in bins.iter_mut().zip(quanta) {
-                // Of what is not a number max and min take the other.
-                *bin = (quanta + 0.5).max(0.0).min(PAST_LINEAR) as i32 as u32;
+                // What is not a number becomes 0.
+                *bin = (quanta + 0.5).clamp(0.0, PAST_LINEAR) as i32 as u32;
             }
             let mut at = 0;
             while at < quanta.len() {
