@@ -13,6 +13,7 @@ use crate::job::{Form, Job};
 use crate::report::cavity_list::{self, TileCavities};
 use crate::report::picture::{Caption, write_png};
 use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
+use crate::screen::Seam;
 use crate::tolerance::Budget;
 
 /// Where in the room the light of the whole job goes.
@@ -112,11 +113,20 @@ fn of_shop(job: &Job, shop: &Shop, part: &Part) -> Vec<Finding> {
         found.push(finding(Severity::Warning, "unconfirmed", message));
     }
     if job.part.form == Form::Die {
-        let message = "a die reflects nothing: no light is reported; step walls between cells do not release \
-                       from a pressed sheet unless seam = \"stitched\"";
+        let message = of_a_die(part.design.as_ref().map(|design| design.seam));
         found.push(finding(Severity::Warning, "die", message));
     }
     found
+}
+
+/// What is to be said of a die of cells with these seams, or of another part.
+fn of_a_die(seam: Option<Seam>) -> &'static str {
+    if seam == Some(Seam::Step) {
+        "a die reflects nothing: no light is reported; step walls between cells do not release from a pressed \
+         sheet; hint: seam = \"stitched\""
+    } else {
+        "a die reflects nothing: no light is reported"
+    }
 }
 
 /// What a tile shows, with the programs that must not be run moved to `rejected/`.
@@ -346,4 +356,17 @@ fn simulate(shop: &Shop, result: &TileResult) -> Option<String> {
     } else {
         format!("{command}  (the maps are reduced by {}; set [maps] full = true first)", result.map_factor)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_dies_of_cells_with_steps_are_told_that_these_do_not_release() {
+        assert!(of_a_die(Some(Seam::Step)).contains("do not release"));
+        for part in [Some(Seam::Stitched), None] {
+            assert_eq!(of_a_die(part), "a die reflects nothing: no light is reported");
+        }
+    }
 }
