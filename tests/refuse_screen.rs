@@ -58,6 +58,10 @@ fn with_audience(audience: &str) -> String {
 #[test]
 fn scenes_that_are_wrong_are_refused_with_their_line() {
     let most = "width_m = 2.0";
+    let stitched = |sweeps: u32| {
+        let key = format!("area_tolerance = 1e-6\narea_sweeps = {sweeps}");
+        changed("area_tolerance = 1e-6", &key).replace("seam = \"step\"", "seam = \"stitched\"")
+    };
     let cases: Vec<(&str, String)> = vec![
         ("unknown-key", changed("facets = 200", "facettes = 200")),
         ("key-without-unit", changed("width_mm = 4.0", "width = 4.0")),
@@ -77,6 +81,10 @@ fn scenes_that_are_wrong_are_refused_with_their_line() {
         ("no-facets", changed("facets = 200", "facets = 0")),
         ("negative-facets", changed("facets = 200", "facets = -5")),
         ("tolerance-zero", changed("area_tolerance = 1e-6", "area_tolerance = 0.0")),
+        ("sweeps-of-steps", changed("area_tolerance = 1e-6", "area_tolerance = 1e-6\narea_sweeps = 5")),
+        ("sweeps-too-many", stitched(17)),
+        ("sweeps-of-few-facets", stitched(5).replace("facets = 200", "facets = 49")),
+        ("sweeps-on-a-flat-screen", stitched(5).replace("\"poisson\"", "\"flat\"")),
         ("projector-behind", changed("[0.0, 0.0, 3.0]", "[0.0, 0.0, -3.0]")),
         ("projector-on-the-screen", changed("[0.0, 0.0, 3.0]", "[0.2, 0.1, 0.0]")),
         ("projector-of-two-numbers", changed("[0.0, 0.0, 3.0]", "[0.0, 3.0]")),

@@ -66,12 +66,17 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     screen::design_streamed::<Refusal>(&scene, &frame, elevation.as_ref(), &watch, &mut |cell| {
         made.count(&cell);
         if let Some(stitching) = &mut stitching {
+            watch.begin("measuring areas", 1);
             stitching.push(&cell);
         }
         if let Some(solids) = &mut solids {
+            watch.begin("meshing", 1);
             solids.push(&cell)?;
         }
-        Ok(writer.push(&cell)?)
+        watch.begin("writing", 1);
+        writer.push(&cell)?;
+        watch.cell_done();
+        Ok(())
     })?;
     made.area_error = stitching.map(Stitching::finish);
     watch.begin("writing", 0);
@@ -138,7 +143,7 @@ fn writable(path: &Path) -> Result<(), Unwritable> {
 }
 
 /// Cells that are done, on a bar on a terminal or a line at every tenth elsewhere, and how long each
-/// stage took: sampling and solving take turns, so each is the sum of its turns.
+/// stage took: they take turns, so each is the sum of its turns.
 struct Watch {
     bar: ProgressBar,
     said: bool,
@@ -152,9 +157,6 @@ struct Stages {
     cells: usize,
 }
 
-/// The stage whose steps are finished cells.
-const LAST_STAGE: &str = "solving";
-
 impl Watch {
     fn new(quiet: bool, total: usize) -> Watch {
         let terminal = std::io::stderr().is_terminal();
@@ -164,6 +166,19 @@ impl Watch {
         }
         let state = Mutex::new(Stages { running: None, done: Vec::new(), cells: 0 });
         Watch { bar, said: !quiet && !terminal, state, total }
+    }
+
+    fn cell_done(&self) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.cells += 1;
+        let (cells, total) = (state.cells, self.total.max(1));
+        self.bar.set_position(cells as u64);
+        if self.said && 10 * cells / total > 10 * (cells - 1) / total {
+            eprintln!("cells {cells} of {total}");
+        }
+        if cells >= total {
+            self.bar.finish_and_clear();
+        }
     }
 
     /// Ends the running stage; the stages in their order, each with its time.
@@ -192,22 +207,7 @@ impl Progress for Watch {
         state.running = Some((stage.to_string(), Instant::now()));
     }
 
-    fn advance(&self, steps: u64) {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        if state.running.as_ref().is_none_or(|(name, _)| name != LAST_STAGE) {
-            return;
-        }
-        let before = state.cells;
-        state.cells += steps as usize;
-        self.bar.set_position(state.cells as u64);
-        let total = self.total.max(1);
-        if self.said && 10 * state.cells / total > 10 * before / total {
-            eprintln!("cells {} of {total}", state.cells);
-        }
-        if state.cells >= total {
-            self.bar.finish_and_clear();
-        }
-    }
+    fn advance(&self, _steps: u64) {}
 
     fn interrupted(&self) -> bool {
         console::interrupted()
@@ -246,8 +246,13 @@ fn summarise(scene: &Scene, made: &Made, arguments: &Arguments, json: bool) {
     println!("{per_cell} facets a cell, {facets} in all; profile {profile}, seam {seam}");
     println!("elevation {low:.3} to {high:.3} mm");
     if let Some(AreaError { rms, worst }) = made.area_error {
+        let sweeps = match scene.microgeometry.area_sweeps {
+            0 => "where their planes meet".to_string(),
+            1 => "after 1 sweep".to_string(),
+            sweeps => format!("after {sweeps} sweeps"),
+        };
         println!(
-            "no steps between cells; where their planes meet facet areas are off by {:.1} % rms, {:.0} % at most",
+            "no steps between cells; {sweeps} facet areas are off by {:.1} % rms, {:.0} % at most",
             1e2 * rms,
             1e2 * worst
         );

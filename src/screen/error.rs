@@ -37,6 +37,18 @@ pub enum Error {
         "{path}:{line}: the screen has {columns} x {rows} cells, at most {most} can be designed; hint: wider cells or a smaller screen"
     )]
     TooManyCells { path: String, line: usize, columns: f64, rows: f64, most: f64 },
+    #[error(
+        "{path}:{line}: area_sweeps repair what stitching does to areas, and cells with steps keep theirs; hint: seam = \"stitched\", or leave area_sweeps out"
+    )]
+    SweepsOfSteps { path: String, line: usize },
+    #[error(
+        "{path}:{line}: area_sweeps repair cells of at least {fewest} facets, these have {facets}; hint: more facets, or leave area_sweeps out"
+    )]
+    SweepsOfFew { path: String, line: usize, facets: f64, fewest: f64 },
+    #[error(
+        "{path}:{line}: area_sweeps repair cells whose bases meet, and with method = \"flat\" they do not; hint: method = \"poisson\", or leave area_sweeps out"
+    )]
+    SweepsOfFlat { path: String, line: usize },
     #[error("{path}:{line}: the reflector is {given}; hint: give material = \"aluminium\", or both n and k")]
     Reflector { path: String, line: usize, given: &'static str },
     #[error(

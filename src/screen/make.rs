@@ -3,6 +3,7 @@ use rayon::prelude::*;
 use super::elevation::{Elevation, elevation};
 use super::facets::Wanted;
 use super::microgeometry::{Workspace, solve};
+use super::repair::{self, Sheet};
 use super::{Cell, CellRange, Design, Error, Facet, Frame, Grazing, Scene, Seam, directions, facets};
 use crate::progress::{Progress, Silent};
 
@@ -15,11 +16,14 @@ const MOST_CONTAINER_GIB: f64 = 32.0;
 const GIB: f64 = (1u64 << 30) as f64;
 /// Cells that are sampled, then solved, at a time.
 const BATCH: usize = 512;
+/// Rows of cells whose areas are repaired at a time, with those around them that they depend on.
+const REPAIRED_ROWS: i32 = 32;
 
 /// Designs cells of a screen (paper, sections 3.1 and 3.2): all of them, or a range; with the
 /// scene's elevation, or a given one. A cell's design depends on the scene and its own elevation
 /// only, never on which others are asked for or on threads. A stitched design also gets the ring
-/// of neighbours around the range, where the screen has them. `progress` is told the cells done and
+/// of neighbours around the range, where the screen has them; with `area_sweeps` a cell also depends on
+/// the cells within 2 `area_sweeps` + 1 rings around it, which are made and left out again. `progress` is told the cells done and
 /// their number. [`design_streamed`] holds no more than a few rows.
 pub fn design(
     scene: &Scene,
@@ -50,7 +54,7 @@ pub fn design(
 
 /// The same, cell by cell into `take`, by row, then column, each as soon as it is done: for whole
 /// screens, which need not be in memory. `progress` hears of a stage "elevation", then by turns of
-/// "sampling" and "solving" with the cells of each; it may end the work. An error of `take` does too.
+/// "sampling", "solving" and, where that is asked for, "repairing areas" with the cells of each; it may end the work. An error of `take` does too.
 pub fn design_streamed<E: From<Error>>(
     scene: &Scene,
     frame: &Frame,
@@ -115,7 +119,39 @@ fn run<E: From<Error>>(
             &own
         }
     };
-    let extent = frame.extent;
+    let sweeps = scene.microgeometry.area_sweeps;
+    if sweeps == 0 || frame.seam == Seam::Step {
+        return solved(scene, frame.extent, elevation, progress, take);
+    }
+    let screen = (scene.columns(), scene.rows());
+    let CellRange { c0, r0, c1, r1 } = frame.extent;
+    for r0 in (r0..r1).step_by(REPAIRED_ROWS as usize) {
+        let band = CellRange { c0, r0, c1, r1: (r0 + REPAIRED_ROWS).min(r1) };
+        let extent = band.grown(repair::rings(sweeps)).within(screen.0, screen.1);
+        let mut cells = Vec::with_capacity(extent.columns() * extent.rows());
+        solved::<Error>(scene, extent, elevation, progress, &mut |cell| {
+            cells.push(cell);
+            Ok(())
+        })?;
+        let Frame { cell_mm, profile, .. } = *frame;
+        progress.begin("repairing areas", (band.columns() * band.rows()) as u64);
+        let mut sheet = Sheet { extent, cells, profile, cell_mm, screen, progress };
+        sheet.repair(band, sweeps)?;
+        for cell in sheet.cells.into_iter().filter(|cell| band.contains(cell.column, cell.row)) {
+            take(cell)?;
+        }
+    }
+    Ok(())
+}
+
+/// The cells of a range, each by itself.
+fn solved<E: From<Error>>(
+    scene: &Scene,
+    extent: CellRange,
+    elevation: &Elevation,
+    progress: &dyn Progress,
+    take: &mut dyn FnMut(Cell) -> Result<(), E>,
+) -> Result<(), E> {
     let count = extent.columns() * extent.rows();
     for start in (0..count).step_by(BATCH) {
         let batch: Vec<(i32, i32, f64)> = (start..(start + BATCH).min(count))

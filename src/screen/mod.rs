@@ -6,6 +6,7 @@
 mod audience;
 mod calibration;
 mod container;
+mod damped;
 mod design;
 mod directions;
 mod elevation;
@@ -16,8 +17,10 @@ mod limits;
 mod make;
 mod microgeometry;
 mod opening;
+mod owned;
 mod pieces;
 mod power;
+mod repair;
 mod rows;
 mod scene;
 mod sight;

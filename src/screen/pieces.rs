@@ -5,8 +5,8 @@ use super::{Cell, Profile};
 
 /// Pieces below this area, in mm2, are rounding.
 const NOTHING_MM2: f64 = 1e-15;
-/// Label of an edge that a neighbour's plane cuts.
-const CUT: u32 = SIDES[0] - 1;
+/// Labels of edges are a plane's index, over this many times the place of its cell among those given.
+const LABELS_A_CELL: u32 = 1 << 20;
 
 /// One cell's planes as a bump, p in mm from the centre of a square that may be another cell's:
 /// dishes are upside down.
@@ -50,7 +50,7 @@ impl Planes {
         self.gx[plane] * p[0] + self.gy[plane] * p[1] + self.c[plane]
     }
 
-    fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.c.len()
     }
 
@@ -123,62 +123,40 @@ pub(super) fn pieces(diagram: &mut Diagram, cells: &[Planes], half: f64) -> Vec<
     found
 }
 
-/// Of each plane of the first cell the area in mm2 over which it is the surface, within a rectangle
-/// that may reach into the squares of the other cells.
-pub(super) fn owned_areas(
-    diagram: &mut Diagram,
-    cells: &[Planes],
-    low: [f64; 2],
-    high: [f64; 2],
-) -> Vec<f64> {
-    let Some((own, rivals)) = cells.split_first() else { return Vec::new() };
-    let own = Function::new(diagram, own, low, high);
-    let rivals: Vec<Function> = rivals.iter().map(Function::unseen).collect();
-    let mut scratch = Scratch::default();
-    let mut areas = vec![0.0; own.planes.len()];
-    for &plane in &own.seen {
-        let mut parts = vec![own.polygons[plane].clone()];
-        for rival in &rivals {
-            let mut kept = Vec::new();
-            for part in parts {
-                if rival.is_below(&part, &own, plane) {
-                    kept.push(part);
-                } else {
-                    scratch.subtract(&part, &own, plane, rival, false, &mut kept);
-                }
-            }
-            parts = kept;
-        }
-        areas[plane] = parts.iter().map(|part| area(part)).sum();
-    }
-    areas
-}
-
 /// One cell's planes and what each has of the square while no other cell is looked at.
-struct Function {
-    planes: Planes,
+pub(super) struct Function {
+    pub planes: Planes,
     polygons: Vec<Vec<Vertex>>,
     /// Planes that have a polygon at all.
-    seen: Vec<usize>,
+    pub seen: Vec<usize>,
+    /// Of the edges that its planes cut, over the plane's index.
+    label: u32,
 }
 
 impl Function {
-    fn new(diagram: &mut Diagram, planes: &Planes, low: [f64; 2], high: [f64; 2]) -> Function {
+    pub fn new(diagram: &mut Diagram, planes: &Planes, low: [f64; 2], high: [f64; 2]) -> Function {
         diagram.forget();
         diagram.compute(&planes.gx, &planes.gy, &planes.c, low, high);
         let polygons: Vec<Vec<Vertex>> = (0..planes.len()).map(|k| diagram.polygon(k).to_vec()).collect();
         let seen = (0..planes.len()).filter(|&k| polygons[k].len() > 2).collect();
-        Function { planes: planes.clone(), polygons, seen }
+        Function { planes: planes.clone(), polygons, seen, label: 0 }
     }
 
-    /// Of planes that only stand against others: any may be the lowest somewhere.
-    fn unseen(planes: &Planes) -> Function {
-        Function { planes: planes.clone(), polygons: Vec::new(), seen: (0..planes.len()).collect() }
+    /// Of planes that only stand against others, as cell number `at` of those given: any may be the lowest
+    /// somewhere.
+    pub fn unseen(planes: &Planes, at: usize) -> Function {
+        let seen = (0..planes.len()).collect();
+        Function { planes: planes.clone(), polygons: Vec::new(), seen, label: at as u32 * LABELS_A_CELL }
+    }
+
+    /// What a plane has of the square while no other cell is looked at.
+    pub fn polygon(&self, plane: usize) -> &[Vertex] {
+        &self.polygons[plane]
     }
 
     /// Whether the plane that is the lowest in the middle of a polygon shows that none of it is this
     /// cell's: most polygons are decided so.
-    fn is_below(&self, polygon: &[Vertex], other: &Function, plane: usize) -> bool {
+    pub fn is_below(&self, polygon: &[Vertex], other: &Function, plane: usize) -> bool {
         let count = polygon.len() as f64;
         let [x, y] = [0, 1].map(|axis| polygon.iter().map(|v| v.0[axis]).sum::<f64>() / count);
         let (mut lowest, mut height) = (0, f64::INFINITY);
@@ -193,8 +171,14 @@ impl Function {
     }
 }
 
+/// The cell, by its place among those given, and the plane that an edge between two facets belongs to;
+/// None on the rectangle's own sides.
+pub(super) fn beyond(label: u32) -> Option<(usize, usize)> {
+    (label < SIDES[0]).then_some(((label / LABELS_A_CELL) as usize, (label % LABELS_A_CELL) as usize))
+}
+
 #[derive(Default)]
-struct Scratch {
+pub(super) struct Scratch {
     cutting: Vec<usize>,
     /// What the rival has of the polygon.
     lost: Vec<Vertex>,
@@ -204,7 +188,7 @@ struct Scratch {
 impl Scratch {
     /// The parts of a polygon of `plane` in which it is not below the rival: the polygon less the convex
     /// set in which every plane of the rival lies above it.
-    fn subtract(
+    pub fn subtract(
         &mut self,
         polygon: &[Vertex],
         function: &Function,
@@ -244,11 +228,12 @@ impl Scratch {
             let normal = [planes.gx[j] - own.gx[plane], planes.gy[j] - own.gy[plane]];
             let offset = own.c[plane] - planes.c[j];
             let mut part = self.lost.clone();
-            clip(&mut part, &mut self.spare, normal, offset, CUT);
+            let label = rival.label + j as u32;
+            clip(&mut part, &mut self.spare, normal, offset, label);
             if area(&part) > NOTHING_MM2 {
                 kept.push(part);
             }
-            clip(&mut self.lost, &mut self.spare, normal.map(|n| -n), -offset, CUT);
+            clip(&mut self.lost, &mut self.spare, normal.map(|n| -n), -offset, label);
             if self.lost.is_empty() {
                 break;
             }

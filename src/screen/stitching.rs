@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::pieces::owned_areas;
+use super::owned::Owner;
 use super::power::Diagram;
 use super::rows::Rows;
 use super::{Cell, Design, Frame};
@@ -82,14 +82,10 @@ impl Stitching {
     fn errors(&self, diagram: &mut Diagram, column: i32, row: i32) -> Vec<f64> {
         let Some(cell) = self.rows.cell(column, row) else { return Vec::new() };
         let planes = self.rows.planes(column, row);
-        let half = 0.5 * self.frame.cell_mm;
-        // As far as a neighbour's square goes, if there is one.
-        let beside = |dc: i32, dr: i32| {
-            let there = planes.len() > 1 && self.rows.cell(column + dc, row + dr).is_some();
-            if there { 3.0 * half } else { half }
-        };
-        let (low, high) = ([-beside(-1, 0), -beside(0, -1)], [beside(1, 0), beside(0, 1)]);
-        let areas = owned_areas(diagram, &planes, low, high);
+        // Without neighbours a cell ends at its own square.
+        let there = |dc: i32, dr: i32| planes.len() > 1 && self.rows.cell(column + dc, row + dr).is_some();
+        let owner = Owner::new(diagram, &planes, self.frame.cell_mm, there);
+        let areas = owner.map_or_else(Vec::new, |mut owner| owner.areas());
         cell.facets.iter().zip(areas).map(|(facet, area)| area / facet.area_mm2 - 1.0).collect()
     }
 }
