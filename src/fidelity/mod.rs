@@ -7,6 +7,7 @@ mod bound;
 pub mod cavities;
 mod histogram;
 pub mod light;
+mod normals;
 mod outline;
 mod pixels;
 pub mod polish;

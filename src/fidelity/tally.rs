@@ -1,17 +1,13 @@
 //! Deviation of the machined surface from the design, counted block by block.
 
-use std::f64::consts::{FRAC_PI_4, PI};
-use std::ops::Range;
-
 use super::Pixels;
 use super::histogram::Histogram;
-use super::pixels::{Line, total};
+use super::normals::Normals;
+use super::pixels::total;
 use crate::grid::{Heights, Window};
 
 /// |deviation| is counted in nanometres.
 const DEVIATION_QUANTUM_MM: f64 = 1e-6;
-/// Normals' errors are counted in ten-thousandths of a degree.
-const ANGLE_QUANTUM_DEG: f64 = 1e-4;
 /// Sums are kept in whole 2^-40 mm, so that the order of adding cannot change them.
 pub(super) const SUM_UNITS_PER_MM: f64 = (1u64 << 40) as f64;
 
@@ -119,7 +115,7 @@ pub struct Tally {
     excess: Option<Place>,
     deviation: Histogram,
     deviation_sum: i128,
-    normals: Histogram,
+    normals: Normals,
     cavity_samples: u64,
     cavity_above: u64,
     cavity_max_mm: f64,
@@ -141,7 +137,7 @@ impl Tally {
             excess: None,
             deviation: Histogram::default(),
             deviation_sum: 0,
-            normals: Histogram::default(),
+            normals: Normals::default(),
             cavity_samples: 0,
             cavity_above: 0,
             cavity_max_mm: 0.0,
@@ -174,7 +170,7 @@ impl Tally {
         for row in block.row..block.row_end() {
             self.add_row(block, row, &layers);
             let mut line = normals.as_deref().map(|map| map.line(block));
-            self.add_normals(block, row, &layers, &mut keys, &mut line);
+            self.normals.add_row(block, row, &layers, self.params.step_mm, &mut keys, &mut line);
             if let (Some(map), Some(line)) = (normals.as_deref_mut(), &line) {
                 map.add(row, line);
             }
@@ -314,54 +310,6 @@ impl Tally {
         }
     }
 
-    fn add_normals(
-        &mut self,
-        block: Window,
-        row: i64,
-        layers: &Layers,
-        keys: &mut [f64],
-        line: &mut Option<Line>,
-    ) {
-        let (Some(design), Some(machined)) =
-            (Stencil::at(layers.design, block, row), Stencil::at(layers.machined, block, row))
-        else {
-            return;
-        };
-        let per_step = 1.0 / self.params.step_mm;
-        keys.fill(f64::NAN);
-        if let (Some(a), Some(b)) = (design.surrounded(block.columns), machined.surrounded(block.columns)) {
-            let inner = a.start.max(b.start)..a.end.min(b.end);
-            if inner.start < inner.end {
-                let (design, machined) = (design.five(inner.clone()), machined.five(inner.clone()));
-                angle_keys(design, machined, 0.5 * per_step, &mut keys[inner]);
-            }
-        }
-        for (start, keys) in (0..).step_by(TOGETHER).zip(keys.chunks(TOGETHER)) {
-            // The tangent is the angle to 1 % up to 10 degrees, and costs nothing.
-            if keys.iter().all(|key| (0.0..SMALL * KEY_OF_45_DEG).contains(key)) {
-                self.normals.add_all(keys);
-                if let Some(line) = line {
-                    let degrees: [f64; TOGETHER] =
-                        std::array::from_fn(|k| keys.get(k).map_or(0.0, |key| key * ANGLE_QUANTUM_DEG));
-                    let weights = &[1.0; TOGETHER][..keys.len()];
-                    line.add_run(block.column + start as i64, weights, &degrees[..keys.len()]);
-                }
-                continue;
-            }
-            for (k, &key) in keys.iter().enumerate() {
-                let quick = (0.0..KEY_OF_45_DEG).contains(&key);
-                let careful = || careful_key(&design, &machined, start + k, per_step);
-                let Some(key) = (if quick { Some(key) } else { careful() }) else { continue };
-                self.normals.add(key);
-                if let Some(line) = line {
-                    let small = key < SMALL * KEY_OF_45_DEG;
-                    let degrees = if small { key * ANGLE_QUANTUM_DEG } else { angle_of_key(key) };
-                    line.add(block.column + (start + k) as i64, [1.0, degrees]);
-                }
-            }
-        }
-    }
-
     /// Takes over everything another tally counted with the same parameters.
     pub fn merge(&mut self, other: &Tally) {
         debug_assert_eq!(self.params, other.params);
@@ -390,7 +338,6 @@ impl Tally {
         let fraction = |part: u64, of: u64| (of > 0).then(|| part as f64 / of as f64);
         let mean = |sum: i128, of: u64| (of > 0).then(|| sum as f64 / SUM_UNITS_PER_MM / of as f64);
         let percentile = |p: f64| self.deviation.percentile(p).map(|quanta| quanta * DEVIATION_QUANTUM_MM);
-        let normal = |p: f64| self.normals.percentile(p).map(angle_of_key);
         let cause = |index: usize| mean(self.cause_sums[index], self.cause_samples);
         Figures {
             samples: self.samples,
@@ -403,8 +350,8 @@ impl Tally {
             deviation_p50_mm: percentile(0.50),
             deviation_p99_mm: percentile(0.99),
             within_limit_fraction: self.params.limit_mm.and_then(|_| fraction(self.within, self.samples)),
-            normal_p50_deg: normal(0.50),
-            normal_p95_deg: normal(0.95),
+            normal_p50_deg: self.normals.percentile_deg(0.50),
+            normal_p95_deg: self.normals.percentile_deg(0.95),
             cavity_area_fraction: fraction(self.cavity_above, self.cavity_samples),
             cavity_max_depth_mm: (self.cavity_samples > 0).then_some(self.cavity_max_mm),
             by_cause: cause(1).map(|scallop_mm| ByCause {
@@ -432,7 +379,7 @@ impl Samples<'_> {
 }
 
 /// Samples that are counted together.
-const TOGETHER: usize = 128;
+pub(super) const TOGETHER: usize = 128;
 
 /// Sums of so many figures below this, in the sums' units, are exact in a double.
 const TOGETHER_MM: f64 = 16.0;
@@ -460,123 +407,4 @@ pub(super) fn covers(layer: &'static str, heights: &Heights, block: Window) -> R
 /// The block's samples of one row.
 pub(super) fn part_of_row(heights: &Heights, block: Window, row: i64) -> &[f32] {
     &heights.row(row)[(block.column - heights.window.column) as usize..][..block.columns]
-}
-
-/// Three rows of a surface, the middle one being judged.
-struct Stencil<'a> {
-    rows: [Option<&'a [f32]>; 3],
-    offset: usize,
-}
-
-impl<'a> Stencil<'a> {
-    fn at(heights: &'a Heights, block: Window, row: i64) -> Option<Stencil<'a>> {
-        let held = |row: i64| {
-            (row >= heights.window.row && row < heights.window.row_end()).then(|| heights.row(row))
-        };
-        let rows = [held(row - 1), held(row), held(row + 1)];
-        rows[1].map(|_| Stencil { rows, offset: (block.column - heights.window.column) as usize })
-    }
-
-    fn sample(&self, row: usize, column: Option<usize>) -> f64 {
-        self.rows[row].and_then(|row| row.get(column?)).map_or(f64::NAN, |&z| f64::from(z))
-    }
-
-    fn centre(&self, i: usize) -> f64 {
-        self.sample(1, Some(self.offset + i))
-    }
-
-    /// The samples, of `columns` to be judged, that have columns on both sides and rows below and above.
-    fn surrounded(&self, columns: usize) -> Option<Range<usize>> {
-        let width = self.rows[0].and(self.rows[2]).and(self.rows[1])?.len();
-        Some(usize::from(self.offset == 0)..columns.min(width - 1 - self.offset))
-    }
-
-    /// Left, right, below, above and centre of surrounded samples, as rows.
-    fn five(&self, inner: Range<usize>) -> [&'a [f32]; 5] {
-        let [below, centre, above] = self.rows.map(Option::unwrap_or_default);
-        let (start, end) = (self.offset + inner.start, self.offset + inner.end);
-        [
-            &centre[start - 1..end - 1],
-            &centre[start + 1..end + 1],
-            &below[start..end],
-            &above[start..end],
-            &centre[start..end],
-        ]
-    }
-
-    /// Left, right, below, above; NaN where there is none.
-    fn around(&self, i: usize) -> [f64; 4] {
-        let column = self.offset + i;
-        [
-            self.sample(1, column.checked_sub(1)),
-            self.sample(1, Some(column + 1)),
-            self.sample(0, Some(column)),
-            self.sample(2, Some(column)),
-        ]
-    }
-}
-
-/// Rise per step along one axis, by the neighbours `low` and `low + 1` that both surfaces have.
-fn difference(mine: &[f64; 4], theirs: &[f64; 4], low: usize, centre: f64) -> Option<f64> {
-    let usable = |index: usize| mine[index].is_finite() && theirs[index].is_finite();
-    match (usable(low), usable(low + 1)) {
-        (true, true) => Some(0.5 * (mine[low + 1] - mine[low])),
-        (true, false) => Some(centre - mine[low]),
-        (false, true) => Some(mine[low + 1] - centre),
-        (false, false) => None,
-    }
-}
-
-/// The angle between the normals of one sample where a neighbour is missing or the angle large; `None` where
-/// there is none.
-fn careful_key(design: &Stencil, machined: &Stencil, i: usize, per_step: f64) -> Option<f64> {
-    if !(design.centre(i) - machined.centre(i)).is_finite() {
-        return None;
-    }
-    let (design_around, machined_around) = (design.around(i), machined.around(i));
-    let slopes = |low: usize| {
-        let a = difference(&design_around, &machined_around, low, design.centre(i))?;
-        let b = difference(&machined_around, &design_around, low, machined.centre(i))?;
-        Some((a * per_step, b * per_step))
-    };
-    let ((ax, bx), (ay, by)) = (slopes(0)?, slopes(2)?);
-    let (cross, dot) = cross_and_dot([ax, ay], [bx, by]);
-    let key = if cross < dot { cross / dot } else { 1.0 + (cross.atan2(dot) - FRAC_PI_4) };
-    Some(key * KEY_OF_45_DEG)
-}
-
-/// [`careful_key`] of surrounded samples with angles below 45 degrees, in one sweep the compiler can vectorise;
-/// NaN, infinite, negative or at least [`KEY_OF_45_DEG`] for the others.
-fn angle_keys(design: [&[f32]; 5], machined: [&[f32]; 5], per_rise: f64, keys: &mut [f64]) {
-    let count = keys.len();
-    let [dl, dr, db, da, dc] = design.map(|row| &row[..count]);
-    let [ml, mr, mb, ma, mc] = machined.map(|row| &row[..count]);
-    for i in 0..count {
-        let slope = |low: f32, high: f32| (f64::from(high) - f64::from(low)) * per_rise;
-        let a = [slope(dl[i], dr[i]), slope(db[i], da[i])];
-        let b = [slope(ml[i], mr[i]), slope(mb[i], ma[i])];
-        let (cross, dot) = cross_and_dot(a, b);
-        // NaN where the sample itself has no data.
-        let held = 0.0 * (f64::from(dc[i]) - f64::from(mc[i]));
-        keys[i] = cross / dot * KEY_OF_45_DEG + held;
-    }
-}
-
-/// Of the normals (-ax, -ay, 1) and (-bx, -by, 1).
-fn cross_and_dot([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> (f64, f64) {
-    let (u, v, w) = (ax - bx, ay - by, ax * by - ay * bx);
-    ((u * u + v * v + w * w).sqrt(), ax * bx + ay * by + 1.0)
-}
-
-/// Tangent up to which it stands for the angle in a picture.
-const SMALL: f64 = 0.17;
-
-/// Below 45 degrees a key is the tangent in units of the angle's quantum, which needs no arc tangent; above, it
-/// grows by the rest of the angle.
-const KEY_OF_45_DEG: f64 = 1.0 / (ANGLE_QUANTUM_DEG * (PI / 180.0));
-
-/// The angle in degrees of a key.
-fn angle_of_key(quanta: f64) -> f64 {
-    let key = quanta / KEY_OF_45_DEG;
-    if key < 1.0 { key.atan().to_degrees() } else { (FRAC_PI_4 + key - 1.0).to_degrees() }
 }
