@@ -136,3 +136,42 @@ impl Heights {
         out
     }
 }
+
+/// z = max(z, from - by_mm); no data raises nothing.
+pub fn raise_row(z_mm: &mut [f32], from_mm: &[f32], by_mm: f32) {
+    each_pair(z_mm, from_mm, |z, from| {
+        let raised = from - by_mm;
+        if raised > z { raised } else { z }
+    });
+}
+
+/// z = min(z, from + by_mm); no data lowers nothing.
+pub fn lower_row(z_mm: &mut [f32], from_mm: &[f32], by_mm: f32) {
+    each_pair(z_mm, from_mm, |z, from| {
+        let lowered = from + by_mm;
+        if lowered < z { lowered } else { z }
+    });
+}
+
+/// A loop over two rows, compiled for vectors of 256 bits where the processor has them.
+#[inline(always)]
+fn each_pair(z_mm: &mut [f32], from_mm: &[f32], of: impl Fn(f32, f32) -> f32) {
+    #[inline(always)]
+    fn body(z_mm: &mut [f32], from_mm: &[f32], of: impl Fn(f32, f32) -> f32) {
+        for (z, from) in z_mm.iter_mut().zip(from_mm) {
+            *z = of(*z, *from);
+        }
+    }
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2(z_mm: &mut [f32], from_mm: &[f32], of: impl Fn(f32, f32) -> f32) {
+            body(z_mm, from_mm, of);
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the feature was found on this processor.
+            return unsafe { avx2(z_mm, from_mm, of) };
+        }
+    }
+    body(z_mm, from_mm, of);
+}

@@ -77,20 +77,14 @@ pub(super) fn raise_row<V: Vectors, P: Pairs>(
     }
     let taps = (hi - lo + 1) as usize;
     let length = ((end - start) as usize).next_multiple_of(LANES);
-    let to = groups_mut(&mut out.row_mut(b)[start as usize..][..length]);
+    let to = &mut out.row_mut(b)[start as usize..][..length];
     if taps <= run.len || run.len > SINGLE {
-        // Offset by offset; s of the highest offset stands first.
+        // Offset by offset.
         let s = &arc.values[arc.index(hi)..][..taps];
         let input = &row[(PAD as i64 + start + shift + i64::from(lo)) as usize..][..length + taps - 1];
-        for (g, to) in to.iter_mut().enumerate() {
-            let mut best = V::load(to);
-            for (k, s) in s.iter().rev().enumerate() {
-                let z = groups(&input[g * LANES + k..][..LANES]);
-                best = V::greater(V::add(V::load(&z[0]), V::splat(*s)), best);
-            }
-            V::store(best, to);
-        }
+        raise_line::<V>(to, input, s);
     } else {
+        let to = groups_mut(to);
         // Sample by sample, the last first.
         let z = &row[PAD + run.first..][..run.len];
         let s =

@@ -2,7 +2,7 @@
 //! of most places without making it.
 
 use crate::cutter::Shape;
-use crate::grid::{Heights, Window};
+use crate::grid::{Heights, Window, lower_row, raise_row};
 
 /// Samples along the side of a block.
 const BLOCK: i64 = 8;
@@ -83,7 +83,7 @@ impl Peaks {
                 let to = (row - out.row) as usize * out.columns + (first - out.column) as usize;
                 let at = (from - self.blocks.row) as usize * self.blocks.columns
                     + (first + across - self.blocks.column) as usize;
-                raise(&mut standing.z_mm[to..to + count], &self.z_mm[at..at + count], rise);
+                raise_row(&mut standing.z_mm[to..to + count], &self.z_mm[at..at + count], rise);
             }
         }
         standing
@@ -156,47 +156,10 @@ fn eroded(shape: &Shape, step_mm: f64, standing: &Heights, out: Window, reach: i
         for &([across, up], rise) in &offsets {
             let at =
                 (row + up - from.row) as usize * from.columns + (out.column + across - from.column) as usize;
-            lower_by(&mut least.z_mm[to..to + out.columns], &standing.z_mm[at..at + out.columns], rise);
+            lower_row(&mut least.z_mm[to..to + out.columns], &standing.z_mm[at..at + out.columns], rise);
         }
     }
     least
-}
-
-/// z = max(z, from - by).
-fn raise(z: &mut [f32], from: &[f32], by: f32) {
-    wide(z, from, |z, from| {
-        for (z, from) in z.iter_mut().zip(from) {
-            let stands = from - by;
-            *z = if stands > *z { stands } else { *z };
-        }
-    });
-}
-
-/// z = min(z, from + by).
-fn lower_by(z: &mut [f32], from: &[f32], by: f32) {
-    wide(z, from, |z, from| {
-        for (z, from) in z.iter_mut().zip(from) {
-            let left = from + by;
-            *z = if left < *z { left } else { *z };
-        }
-    });
-}
-
-/// Runs a loop over two rows, compiled for vectors of 256 bits where the processor has them.
-#[inline(always)]
-fn wide(z: &mut [f32], from: &[f32], body: impl Fn(&mut [f32], &[f32])) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn avx2(z: &mut [f32], from: &[f32], body: impl Fn(&mut [f32], &[f32])) {
-            body(z, from);
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature was found on this processor.
-            return unsafe { avx2(z, from, body) };
-        }
-    }
-    body(z, from);
 }
 
 /// Every offset between blocks within the cutter, and the cutter's rise there, less or more its rounding; `samples`

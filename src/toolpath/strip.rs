@@ -3,7 +3,7 @@
 use super::Error;
 use super::passes::{Axis, Layout};
 use crate::compensation::Facets;
-use crate::grid::{Heights, Window};
+use crate::grid::{Heights, Window, raise_row};
 use crate::surface::Surface;
 
 /// Samples held at most by one band (4 bytes each).
@@ -72,7 +72,7 @@ impl Strip {
         let columns = heights.window.columns;
         let mut blocks = vec![f32::NEG_INFINITY; columns * heights.window.rows.div_ceil(BLOCK)];
         for (rows, block) in heights.z_mm.chunks(BLOCK * columns).zip(blocks.chunks_exact_mut(columns)) {
-            rows.chunks_exact(columns).for_each(|row| raise(block, row));
+            rows.chunks_exact(columns).for_each(|row| raise_row(block, row, 0.0));
         }
         Ok(Strip { heights, facets, step_mm, missed_mm, blocks })
     }
@@ -91,7 +91,7 @@ impl Strip {
             } else {
                 (&self.heights.z_mm[row * window.columns..], 1)
             };
-            raise(&mut z_mm, &from[..window.columns]);
+            raise_row(&mut z_mm, &from[..window.columns], 0.0);
             row += rows;
         }
         let around = (reach_mm / self.step_mm).ceil() as usize + 1;
@@ -102,28 +102,6 @@ impl Strip {
             missed_mm: self.missed_mm,
         }
     }
-}
-
-/// Raises each height to the other one, where that is data.
-fn raise(heights: &mut [f32], others: &[f32]) {
-    #[inline(always)]
-    fn body(heights: &mut [f32], others: &[f32]) {
-        for (z, &other) in heights.iter_mut().zip(others) {
-            *z = if other > *z { other } else { *z };
-        }
-    }
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn avx2(heights: &mut [f32], others: &[f32]) {
-            body(heights, others);
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature was found on this processor.
-            return unsafe { avx2(heights, others) };
-        }
-    }
-    body(heights, others);
 }
 
 /// An upper bound of the heights in reach along one pass.
