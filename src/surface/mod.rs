@@ -13,6 +13,7 @@ mod open;
 mod pitch;
 mod png;
 mod raw;
+mod samples;
 mod stl;
 mod tiff;
 mod transform;
