@@ -55,7 +55,8 @@ fn naive_ns_per_sample(h: &Heights, profile: &Profile) -> f64 {
             }
         }
     }
-    let side = 24i64;
+    // Enough of them for the thread's clock, which moves in steps of milliseconds.
+    let side = (2400 / reach.max(1)).clamp(24, 240).min(h.window.rows as i64 - 2 * reach);
     let ns = nanoseconds(1, || {
         let mut sum = 0.0;
         for row in reach..reach + side {
