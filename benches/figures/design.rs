@@ -106,7 +106,7 @@ fn stitched() -> Vec<Figure> {
             Figure {
                 title: format!("Facet areas once stitched, in {place}"),
                 subtitle: format!(
-                    "dishes, {SIDE} x {SIDE} cells of 200 facets; to the left of a curve all are nearer to their area; repaired by {SWEEPS} sweeps"
+                    "dishes, {SIDE} x {SIDE} cells of 200 facets; to the left of a curve all are nearer; {SWEEPS} sweeps"
                 ),
                 x: Axis::new("part of the facets, %", 0.0, 100.0),
                 y: Axis { logarithms: true, ..Axis::new("area off by, %", -2.0, 2.5) },
