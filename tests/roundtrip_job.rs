@@ -378,14 +378,20 @@ fn gcode_and_rml_move_along_the_same_curve() {
     }
 }
 
-/// Holes, marks and the slot with its tabs too: the same bound as for a finish.
+/// Roughing, holes, marks, the slot with its tabs and the run in air too: the same bound as for a finish.
 #[test]
 fn gcode_and_rml_move_along_the_same_curve_beside_the_surface() {
     let of = |machine: &str| {
-        let bench = with_all_beside(&[("name = \"linuxcnc-mill\"", machine)]);
+        let above = "tool = \"flat-2\"\nfeed_mm_min = 1500";
+        let bench = with_all_beside(&[
+            ("name = \"linuxcnc-mill\"", machine),
+            (above, &format!("{above}\nabove_mm = 2")),
+            // Not a whole number of units of RML-1.
+            ("stepdown_mm = 0.3\nstock", "stepdown_mm = 0.297\nstock"),
+        ]);
         let report = bench.mill(0);
         let simplify = report["fidelity"]["gouge_budget_mm"]["simplify"].as_f64().expect("a share");
-        ([0, 1, 3, 4, 7].map(|nth| path(&bench, nth, 0.01)), simplify)
+        ([0, 1, 2, 3, 4, 5, 6, 7].map(|nth| path(&bench, nth, 0.01)), simplify)
     };
     let (gcode, first) = of("name = \"linuxcnc-mill\"");
     let (rml, second) = of("name = \"roland-egx-600\"");

@@ -16,7 +16,7 @@ use crate::post::{Dialect, Section};
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::tolerance::Budget;
-use crate::toolpath::{self, Rest, Retract, Site, finish, rough};
+use crate::toolpath::{self, Rest, Retract, RoughGrid, Site, finish, rough};
 use crate::verify::{Extent, Reading, Timing};
 
 /// Passes between two places where a zigzag program can start again.
@@ -221,6 +221,11 @@ pub fn programs(
         left_out: Vec::new(),
         passes: Vec::new(),
     };
+    let controllers = shop
+        .dialects
+        .iter()
+        .map(|dialect| (dialect.unit_mm, dialect.path_tolerance_mm + dialect.merge_tolerance_mm));
+    let rough_grid = RoughGrid::of(&controllers.collect::<Vec<_>>());
     // Last of all, since they go around the others.
     let outlines = |index: &usize| job.operations[*index].kind == job::Kind::Outline;
     let (last, first): (Vec<usize>, Vec<usize>) = (0..job.operations.len()).partition(outlines);
@@ -252,7 +257,7 @@ pub fn programs(
                 let clear_mm = clear_mm(job, shop, index, steepest, cut_mm);
                 let params = rough::Params {
                     shape: tool.shape,
-                    stepdown_mm: operation.stepdown_mm.unwrap_or_default(),
+                    stepdown_mm: stepdown_mm(operation, tool).unwrap_or_default(),
                     stepover_mm: operation.stepover_mm,
                     stock_to_leave_mm: operation.stock_to_leave_mm,
                     direction_deg: operation.direction_deg,
@@ -260,7 +265,8 @@ pub fn programs(
                     ramp_slope: ramp_slope(operation, tool),
                     clear_mm,
                 };
-                rough::rough(&site, &params, &tell).map_err(refused)?
+                let path = rough::rough(&rough_grid.site(&site, &params), &params, &tell);
+                path.and_then(|path| path.in_units(site.unit_mm)).map_err(refused)?
             }
             job::Kind::Finish => {
                 let params = finishing(operation, tool);
@@ -312,6 +318,13 @@ fn stay_mm(shop: &Shop, tool: &Tool, height_mm: f64) -> f64 {
     let rate = &shop.machine.rate;
     let minutes = 2.0 * height_mm / rate.rapid_z_mm_min + toolpath::APPROACH_MM / tool.plunge_mm_min;
     tool.feed_mm_min * minutes
+}
+
+/// The stepdown that an operation is cut with: as the job asks, but no deeper than the tool may bite.
+pub fn stepdown_mm(operation: &job::Operation, tool: &Tool) -> Option<f64> {
+    operation
+        .stepdown_mm
+        .map(|wanted_mm| tool.max_depth_mm.map_or(wanted_mm, |most_mm| most_mm.min(wanted_mm)))
 }
 
 /// How steeply roughing goes down: as the job asks, but no faster than the tool plunges.

@@ -22,6 +22,7 @@ mod pen;
 mod ramp;
 mod rest;
 pub mod rough;
+mod rough_grid;
 mod slant;
 mod strip;
 mod table;
@@ -30,6 +31,7 @@ mod tilt;
 pub use passes::{Axis, Layout};
 pub use pen::APPROACH_MM;
 pub use rest::Rest;
+pub use rough_grid::RoughGrid;
 pub use tilt::{Tilt, Worst};
 
 use crate::compensation;

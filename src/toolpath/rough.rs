@@ -17,7 +17,8 @@ use crate::compensation::{self, Faces, Tables};
 use crate::cutter::Shape;
 
 /// How far a roughing profile may stand above what is left for it, in mm besides a grid unit: what is
-/// left varies by it, and the moves stay few.
+/// left varies by it, and the moves stay few. A cut that would nowhere go deeper than that, or than half a
+/// stepdown, is left out: it is not worth its retract and its way down.
 const SLACK_MM: f64 = 0.01;
 
 /// Longer links, in stepovers, are travelled on the clearance plane.
@@ -73,7 +74,7 @@ impl Plan {
 }
 
 /// Plans the levels of a roughing operation. The path stays `stock_to_leave_mm` above the samples (less the
-/// budget), and no more than `SLACK_MM` and a grid unit above that.
+/// budget), and no more than `SLACK_MM` and a grid unit above that, twice `SLACK_MM` where a level would take no more.
 pub fn rough(site: &Site, params: &Params, progress: Progress) -> Result<Toolpath, Error> {
     let (layout, stepdown) = layout(site, params)?;
     let plan = profiles(site, params, layout, progress)?;
@@ -241,10 +242,15 @@ fn row_profiles(
 /// pocket and each side of the margin is cleared in one go where it can be.
 fn cut_level(site: &Site, params: &Params, plan: &Plan, above: i32, level: i32, pen: &mut Pen) {
     let point = |u, v, z| plan.layout.along.point(u, v, z);
+    // What is left out here is no deeper than half a stepdown, so no later level cuts there either.
+    let crumb = ((SLACK_MM / site.unit_mm) as i32).min((above - level) / 2);
+    let worth = |cut: &Profile| cut.iter().any(|vertex| above - vertex[1] > crumb);
     let mut rows: Vec<Vec<Option<Profile>>> = plan
         .rows
         .iter()
-        .map(|row| row.profiles.iter().flat_map(|p| levels::cuts(p, above, level)).map(Some).collect())
+        .map(|row| {
+            row.profiles.iter().flat_map(|p| levels::cuts(p, above, level)).filter(worth).map(Some).collect()
+        })
         .collect();
     for first in 0..rows.len() {
         for nth in 0..rows[first].len() {
