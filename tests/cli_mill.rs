@@ -375,4 +375,14 @@ fn a_shank_that_rubs_is_found_and_its_programs_are_set_aside() {
         "{message}"
     );
     assert!(programs(&report).iter().all(|file| file.starts_with("rejected/")));
+    // It asks for steps of 1 mm, which the flat does not take.
+    let steps = findings.iter().find(|finding| finding["code"] == "stepdown").expect("said");
+    assert_eq!(
+        steps["message"],
+        "operation 1 (rough, flat-3) is cut in steps of 0.45 mm, the max_depth_mm of its tool; stepdown_mm asks for 1"
+    );
+    let roughing = report["tiles"][0]["programs"].as_array().expect("programs").iter();
+    let bites = roughing.filter(|p| p["operation"] == "rough").filter_map(|p| p["deepest_bite_mm"].as_f64());
+    let deepest = bites.fold(0.0, f64::max);
+    assert!((deepest - 0.45).abs() < 1e-6, "{deepest}");
 }

@@ -37,7 +37,7 @@ impl Work<'_> {
                     at_mm: self.places(&site),
                     diameter_mm: operation.diameter_mm,
                     depth_mm,
-                    stepdown_mm: operation.stepdown_mm.unwrap_or_else(|| {
+                    stepdown_mm: plan::stepdown_mm(operation, self.tool).unwrap_or_else(|| {
                         let radius_mm = self.tool.shape.radius_mm();
                         self.tool.max_depth_mm.map_or(radius_mm, |most_mm| most_mm.min(radius_mm))
                     }),
@@ -135,7 +135,7 @@ pub fn cut_out_of(operation: &Operation, tool: &Tool, shop: &Shop) -> CutOut {
     let count = operation.tabs.unwrap_or(1);
     CutOut {
         shape: tool.shape,
-        stepdown_mm: operation.stepdown_mm.unwrap_or_default(),
+        stepdown_mm: plan::stepdown_mm(operation, tool).unwrap_or_default(),
         thickness_mm: shop.stock.thickness_mm,
         through_mm: operation.through_mm.unwrap_or(0.0),
         sacrificial_mm: shop.fixture.sacrificial_mm,

@@ -146,15 +146,15 @@ fn shown(length: f64, limit: f64) -> String {
 pub fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> {
     let tool = &shop.tools[program.operation];
     let mut found = Vec::new();
-    let bite_mm = cut.deepest_bite_mm();
     if let Some(most_mm) = tool.max_depth_mm
-        && bite_mm > most_mm + BITE_MM
+        && let Some(bite) = cut.deepest()
+        && bite.depth_mm > most_mm + BITE_MM
     {
         let message = format!(
-            "{} bites {bite_mm:.3} mm deep at once, its max_depth_mm is {most_mm}; hint: a smaller stepdown, or a semi-finish before it",
-            tool.name
+            "{} bites {:.3} mm deep at once, its max_depth_mm is {most_mm}; hint: a semi-finish (stock_to_leave_mm) before it that leaves less",
+            tool.name, bite.depth_mm
         );
-        found.push(Remark::new(Severity::Warning, "bite", None, message));
+        found.push(Remark::new(Severity::Warning, "bite", Some(bite.line), message));
     }
     let length_m = program.extent.cutting_mm * 1e-3;
     if let Some(life_m) = tool.tool_life_m
@@ -175,12 +175,15 @@ pub fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> 
         found.push(Remark::new(Severity::Note, "sections", None, message));
     }
     let gcode = program.reading.summary.language == Language::GCode;
+    let air = shop.kinds[program.operation] == Kind::Outline;
     let feeds = Judged::new(&program.reading, tool.shape, [0.0; 3]).feeds();
     for (fastest, most, key) in [
         (feeds.lateral, tool.feed_mm_min, "feed_mm_min"),
         (feeds.plunge, tool.plunge_mm_min, "plunge_mm_min"),
     ] {
-        if let Some(fastest) = fastest.filter(|fastest| fastest.feed_mm_min > most + 1e-3) {
+        // Nothing is cut in air, and there RML-1 does not tell the way from one round to the next from the rounds.
+        let over = fastest.filter(|fastest| fastest.feed_mm_min > most + 1e-3 && (gcode || !air));
+        if let Some(fastest) = over {
             let message =
                 format!("feeds {} mm/min, the {key} of {} is {most}", fastest.feed_mm_min, tool.name);
             found.push(Remark::new(Severity::Warning, "feed", Some(fastest.line), message));
@@ -193,7 +196,6 @@ pub fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> 
         );
         found.push(Remark::new(Severity::Warning, "plunge", Some(bite.line), message));
     }
-    let air = shop.kinds[program.operation] == Kind::Outline;
     let spindle_off = |note: &&Note| matches!(note, Note::SpindleOff { .. });
     let notes = &program.reading.summary.notes;
     // RML-1 says nothing of it: its moves are the same in air and in metal.

@@ -6,7 +6,7 @@ use super::cut::{Milled, Motions, TileResult};
 use super::part::Part;
 use super::remarks::{of_face, of_motions, of_rounding, of_wear};
 use super::shop::Shop;
-use super::{Error, WITHIN, light, pages};
+use super::{Error, WITHIN, light, pages, plan};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
 use crate::job::{Form, Job};
@@ -112,11 +112,27 @@ fn of_shop(job: &Job, shop: &Shop, part: &Part) -> Vec<Finding> {
         );
         found.push(finding(Severity::Warning, "unconfirmed", message));
     }
+    found.extend(of_stepdowns(job, shop));
     if job.part.form == Form::Die {
         let message = of_a_die(part.design.as_ref().map(|design| design.seam));
         found.push(finding(Severity::Warning, "die", message));
     }
     found
+}
+
+/// Stepdowns that a tool does not take, and what is cut instead.
+fn of_stepdowns<'a>(job: &'a Job, shop: &'a Shop) -> impl Iterator<Item = Finding> + 'a {
+    job.operations.iter().zip(&shop.tools).enumerate().filter_map(|(index, (operation, tool))| {
+        let wanted_mm = operation.stepdown_mm?;
+        let cut_mm = plan::stepdown_mm(operation, tool).filter(|cut_mm| *cut_mm < wanted_mm)?;
+        let message = format!(
+            "operation {} ({}, {}) is cut in steps of {cut_mm} mm, the max_depth_mm of its tool; stepdown_mm asks for {wanted_mm}",
+            index + 1,
+            operation.kind.word(),
+            tool.name
+        );
+        Some(finding(Severity::Warning, "stepdown", message))
+    })
 }
 
 /// What is to be said of a die of cells with these seams, or of another part.

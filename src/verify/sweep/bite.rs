@@ -34,9 +34,15 @@ pub struct ProgramCut {
 }
 
 impl ProgramCut {
-    /// The deepest bite of any motion in mm, 0 if nothing was cut.
+    /// The deepest bite of any motion; None if nothing was cut.
+    pub fn deepest(&self) -> Option<Bite> {
+        let bites = [self.cut, self.plunge, self.rapid].into_iter().flatten();
+        bites.reduce(|deepest, bite| if bite.before(&deepest) { bite } else { deepest })
+    }
+
+    /// Its depth in mm, 0 if nothing was cut.
     pub fn deepest_bite_mm(&self) -> f64 {
-        [self.cut, self.plunge, self.rapid].iter().flatten().fold(0.0, |most, b| b.depth_mm.max(most))
+        self.deepest().map_or(0.0, |bite| bite.depth_mm)
     }
 
     /// Whether any sample was lowered.
