@@ -218,7 +218,7 @@ impl Scanner<'_> {
             self.advance()?;
             self.blanks()?;
             if !matches!(self.next, Some(b'0'..=b'9' | b'+' | b'-' | b'.')) {
-                return Err(Error::NumberMissing { at: self.at(), letter: ',' });
+                return Err(Error::Comma { at: self.at() });
             }
         }
         Ok(())
@@ -230,11 +230,11 @@ impl Scanner<'_> {
         while let Some(byte @ (b'0'..=b'9' | b'+' | b'-' | b'.')) = self.next {
             text.push(byte as char);
             if text.len() > 40 {
-                return Err(Error::NumberMalformed { at, letter: ',' });
+                return Err(Error::Signs { at });
             }
             self.advance()?;
         }
-        text.parse().map_err(|_| Error::NumberMalformed { at, letter: ',' })
+        text.parse().map_err(|_| Error::Signs { at })
     }
 }
 
@@ -339,7 +339,10 @@ impl Machine {
             }
             "!RC" => {
                 count(|n| n == 1, "one speed code")?;
-                ranged(numbers[0], "the speed code", 0.0, 32_767.0)?;
+                let Number { value, at } = numbers[0];
+                if !((0.0..=15.0).contains(&value) || (100.0..=32_767.0).contains(&value)) {
+                    return Err(Error::SpeedCode { at, value });
+                }
             }
             "J" => {
                 count(|n| n == 1, "one tool number")?;

@@ -218,7 +218,7 @@ fn number(text: &[u8], from: usize, letter: u8, line: u64) -> Result<(f64, usize
                     decimals += usize::from(point);
                 } else if !point {
                     let at = Place { line, column: from as u64 };
-                    return Err(Error::Range { at, what: "the number", value: 1e18, low: -1e17, high: 1e17 });
+                    return Err(Error::Digits { at, letter: letter as char });
                 }
                 end = i + 1;
             }
@@ -249,9 +249,22 @@ fn number(text: &[u8], from: usize, letter: u8, line: u64) -> Result<(f64, usize
             _ => Err(Error::NumberMissing { at, letter: letter as char }),
         };
     }
+    if exponent(&text[end..]) && matches!(letter, b'X'..=b'Z' | b'I'..=b'K' | b'R' | b'F') {
+        let at = Place { line, column: from as u64 };
+        return Err(Error::Exponent { at, letter: letter as char });
+    }
     // Both are exact below 2^53, so the quotient is the nearest double to what is written.
     let value = mantissa as f64 / TENS[decimals];
     Ok((if negative { -value } else { value }, end))
+}
+
+/// Whether what follows a number's digits makes it one in powers of ten. Where a block has a word E it stands
+/// with P alone.
+fn exponent(text: &[u8]) -> bool {
+    match text {
+        [b'e' | b'E', b'0'..=b'9', ..] | [b'e' | b'E', b'+' | b'-', b'0'..=b'9', ..] => true,
+        _ => false,
+    }
 }
 
 fn g_group(code: u16, at: Place) -> Result<Option<Group>, Error> {

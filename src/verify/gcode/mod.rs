@@ -81,7 +81,7 @@ pub(super) fn read(source: &mut dyn BufRead, each: &mut Sink) -> Result<Summary,
         }
     }
     if !ended {
-        return Err(if number == 0 { Error::Empty } else { Error::NoEnd { line: number } });
+        return Err(if summary.blocks == 0 { Error::Empty } else { Error::NoEnd { line: number } });
     }
     Ok(summary)
 }
@@ -116,7 +116,7 @@ impl Modal {
                 (seconds, letter) = (block.take(b'X'), b'X');
                 waits_by_x = true;
             }
-            let seconds = seconds.ok_or(Error::NumberMissing { at, letter: 'P' })?;
+            let seconds = seconds.ok_or(Error::DwellTime { at })?;
             self.bounded(block, letter, "the dwell in seconds", seconds, 0.0, 1e6)?;
             if seconds > LONG_DWELL_S {
                 notes.push(Note::LongDwell { line, seconds });
