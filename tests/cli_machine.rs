@@ -99,3 +99,74 @@ fn a_machine_is_calibrated_by_three_times() {
         .code(2)
         .stderr(contains("is a folder"));
 }
+
+/// docs/adding-a-machine.md to the letter: its commands in their order, and between them the changes that it asks for.
+#[test]
+fn the_guide_to_adding_a_machine_works_as_it_is_written() {
+    let guide = include_str!("../docs/adding-a-machine.md");
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mine = folder.path().join("mine");
+    let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/samples");
+    std::fs::create_dir_all(&mine).expect("writable");
+    let change = |file: &str, from: &str, to: &str| {
+        let path = mine.join(file);
+        let text = std::fs::read_to_string(&path).expect("there");
+        assert!(text.contains(from), "{file}: {from}");
+        std::fs::write(&path, text.replacen(from, to, 1)).expect("writable");
+    };
+    let asked = |said: &str| assert!(guide.contains(said), "{said}");
+    let blocks = guide.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let mut run = 0;
+    for line in blocks.flat_map(str::lines) {
+        let command = line.split('#').next().unwrap_or(line).trim();
+        run += 1;
+        if let Some(files) = command.strip_prefix("cp ") {
+            for file in files.trim_end_matches(" .").split(' ') {
+                let from = file.replace("../screenmill/samples", samples);
+                let name = from.rsplit('/').next().expect("a name");
+                std::fs::copy(&from, mine.join(name)).expect("a sample");
+            }
+            asked("`screen = \"theatre.toml\"`, `name = \"my-mill\"`, and take the line with `post` out");
+            change("job.toml", "\"../theatre.toml\"", "\"theatre.toml\"");
+            change("job.toml", "name = \"roland-egx-600\"\npost", "name = \"my-mill\"\n# post");
+            // For the test's sake only: one cell in coarse steps on a flat screen.
+            change("job.toml", "327, 152]", "325, 150]\nstep_mm = 0.02");
+            change("theatre.toml", "method = \"poisson\"", "method = \"flat\"");
+            continue;
+        }
+        let (command, output) = command.split_once(" > ").unwrap_or((command, ""));
+        let arguments = command.strip_prefix("screenmill ").expect("one of ours");
+        let done = Command::cargo_bin("screenmill")
+            .expect("built")
+            .args(arguments.split(' '))
+            .current_dir(&mine)
+            .assert()
+            .success();
+        match output {
+            "" => {}
+            file => std::fs::write(mine.join(file), &done.get_output().stdout).expect("writable"),
+        }
+        match output {
+            "my-mill.toml" => change(output, "name = \"linuxcnc-mill\"", "name = \"my-mill\""),
+            "my-dialect.toml" => {
+                change(output, "name = \"mach3\"", "name = \"my-dialect\"");
+                asked("`dialects = [\"my-dialect\"]`");
+                change("my-mill.toml", "dialects = [\"linuxcnc\"]", "dialects = [\"my-dialect\"]");
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(run, 10);
+    let program =
+        std::fs::read_to_string(mine.join("out/programs/r0c0-01-rough-flat-3.tap")).expect("written");
+    assert!(
+        program.starts_with("(screenmill: ") && program.contains("post my-dialect, machine my-mill)"),
+        "{program}"
+    );
+    // A dialect that is nowhere is told when the machine is read.
+    change("my-mill.toml", "dialects = [\"my-dialect\"]", "dialects = [\"my-dialct\"]");
+    let file = mine.join("my-mill.toml");
+    screenmill(&format!("machines {}", file.display()))
+        .code(2)
+        .stderr(contains("post \"my-dialct\" is not known"));
+}

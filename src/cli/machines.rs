@@ -1,7 +1,10 @@
 //! `machines`: the machines that programs can be written for.
 
+use std::path::Path;
+
 use screenmill::catalogue::{self, Kind};
 use screenmill::machine::{Machine, SpindleLaw};
+use screenmill::post::Dialect;
 
 use super::{Common, Outcome, Refusal};
 
@@ -16,6 +19,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     if let Some(name) = &arguments.name {
         let machine = Machine::find(name, None)?;
+        // As a job beside the file finds them.
+        let folder = Path::new(name).parent();
+        for dialect in &machine.dialects {
+            Dialect::find(dialect, folder)?;
+        }
         if common.json {
             println!("{}", serde_json::to_string(&machine)?);
         } else {
