@@ -328,13 +328,6 @@ impl Job {
             ("z_min_mm", part.z_min_mm.is_some(), heights, "heights", leave_out),
             ("z_max_mm", part.z_max_mm.is_some(), heights, "heights", leave_out),
             ("level = \"plane\"", level, !heights, "screen, design or mesh", level_hint),
-            (
-                "level = \"plane\"",
-                level,
-                self.stock.blanks == Blanks::PerTile || mesh,
-                "blanks = \"per-tile\"",
-                "tiles of one sheet cannot each be turned",
-            ),
         ];
         for (key, given, allowed, with, hint) in placed {
             if given && !allowed {

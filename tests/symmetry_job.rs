@@ -144,3 +144,30 @@ fn a_levelled_tile_turned_back_by_its_wedge_is_the_tile() {
         assert!(low > -1e-6 && high < 1e-6, "{form}: {low} {middle} {high}");
     }
 }
+
+/// A design on one sheet is turned as a whole, its neighbours with it: where one tile is the whole, it lies and sends
+/// its light as the tile on a blank of its own does.
+#[test]
+fn one_sheet_of_a_design_is_turned_as_its_only_tile_is() {
+    let of = |blanks: &str| {
+        let bench = Bench::with(&[
+            ("cells = [324, 149, 325, 150]", "cells = [10, 20, 12, 21]"),
+            ("step_mm = 0.02", "step_mm = 0.02\nlevel = \"plane\""),
+            ("margin_mm = 3", &format!("margin_mm = 5\nblanks = \"{blanks}\"")),
+        ]);
+        let report = bench.mill(0);
+        (report, bench.heights("out/maps/r0c0-design.tif"))
+    };
+    let ((own, own_z), (sheet, sheet_z)) = (of("per-tile"), of("one"));
+    let wedge: [[f64; 2]; 2] = [&own, &sheet].map(|report| numbers(&report["tiles"][0]["wedge_deg"]));
+    assert!(wedge[0] == wedge[1] && wedge[0][0] > 4.0, "{wedge:?}");
+    // A sheet's frame is that of the sheet as it lies.
+    assert_eq!(numbers::<3>(&sheet["tiles"][0]["program_zero_mm"]), [0.0, 0.0, 0.2]);
+    let apart = own_z.iter().zip(&sheet_z).filter(|(a, _)| !a.is_nan()).map(|(a, b)| f64::from(a - b));
+    let (low, high) = apart.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), d| (d.min(l), d.max(h)));
+    assert!(own_z.len() == sheet_z.len() && high - low < 1e-6, "{low} {high}");
+    for key in ["on_audience_designed", "leak_designed", "gain_designed"] {
+        let [a, b] = [&own, &sheet].map(|report| report["light"][key].as_f64().expect("a figure"));
+        assert!((a / b - 1.0).abs() < 1e-9, "{key}: {a} and {b}");
+    }
+}

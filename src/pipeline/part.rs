@@ -7,6 +7,7 @@ use glam::{DMat3, DVec3};
 
 use super::Error;
 use crate::fidelity::light::Pose;
+use crate::grid::Window;
 use crate::job::{Blanks, Edge, Form, Job, Level, Unit, Up};
 use crate::machine::{Quantum, Tile};
 use crate::progress::Progress;
@@ -21,9 +22,18 @@ pub struct Part {
     /// The whole part as it is cut: turned level if it is a mesh, turned into its die.
     pub whole: Arc<dyn Surface>,
     pub notes: Vec<String>,
-    /// Wedge angles of a levelled mesh; tiles of a design are levelled one by one.
+    /// Wedge angles of what was turned as a whole; tiles of a design on blanks of their own are levelled one by one.
     wedge_deg: [f64; 2],
     undercuts: Option<Undercuts>,
+    /// A design that is cut from one sheet, and so turned as one.
+    turned: Option<Turned>,
+}
+
+/// A point of what was turned is back . (p - shift) of what it was.
+#[derive(Clone, Copy)]
+struct Turned {
+    back: DMat3,
+    shift_mm: DVec3,
 }
 
 /// Faces that lean over after levelling.
@@ -76,12 +86,10 @@ impl Part {
                     notes: opened.notes,
                     wedge_deg: [0.0; 2],
                     undercuts: None,
+                    turned: None,
                 };
                 if spec.level == Level::Plane {
-                    let level = part.whole.levelled()?;
-                    part.wedge_deg = wedge(job, &level);
-                    part.undercuts = undercuts(&level);
-                    part.whole = Arc::new(level.surface);
+                    part.turn(job)?;
                 }
                 part
             }
@@ -121,14 +129,29 @@ impl Part {
         };
         let design = Arc::new(design);
         let whole = Designed::whole(Arc::clone(&design), spec.step_mm)?;
-        Ok(Part {
+        let mut part = Part {
             design: Some(design),
             scene,
             whole: Arc::new(whole),
             notes: Vec::new(),
             wedge_deg: [0.0; 2],
             undercuts: None,
-        })
+            turned: None,
+        };
+        if spec.level == Level::Plane && job.stock.blanks == Blanks::One {
+            part.turned = Some(part.turn(job)?);
+        }
+        Ok(part)
+    }
+
+    /// Turns the whole part level.
+    fn turn(&mut self, job: &Job) -> Result<Turned, Error> {
+        let level = self.whole.levelled()?;
+        self.wedge_deg = wedge(job, &level);
+        self.undercuts = undercuts(&level);
+        let (back, shift_mm) = (back(&level), DVec3::from_array(level.shift_mm));
+        self.whole = Arc::new(level.surface);
+        Ok(Turned { back, shift_mm })
     }
 
     /// Refuses a limit on the light of a part that has none.
@@ -146,9 +169,9 @@ impl Part {
 
     /// What the part may be cut between.
     pub fn quantum(&self) -> Quantum {
-        match &self.design {
-            Some(design) => Quantum::Cell { cell_mm: design.cell_mm },
-            None => Quantum::Sample { step_mm: self.whole.lattice().step_mm },
+        match (&self.design, self.turned) {
+            (Some(design), None) => Quantum::Cell { cell_mm: design.cell_mm },
+            _ => Quantum::Sample { step_mm: self.whole.lattice().step_mm },
         }
     }
 
@@ -168,7 +191,7 @@ impl Part {
         let mut rotation = DMat3::IDENTITY;
         let mut shift_mm = DVec3::ZERO;
         let surface: Arc<dyn Surface> = match &self.design {
-            Some(design) if !(one_sheet && job.part.edge == Edge::Wall) => {
+            Some(design) if self.turned.is_none() && !(one_sheet && job.part.edge == Edge::Wall) => {
                 let cell_mm = design.cell_mm;
                 let count = |length_mm: f64| (length_mm / cell_mm).round() as i32;
                 let die = job.part.form == Form::Die;
@@ -183,9 +206,7 @@ impl Part {
                     let level = piece.levelled()?;
                     wedge_deg = wedge(job, &level);
                     undercut = undercuts(&level);
-                    // Columns of the transpose are the rows of the rotation.
-                    let back = level.rotation.map(DVec3::from_array);
-                    rotation = DMat3::from_cols(back[0], back[1], back[2]);
+                    rotation = back(&level);
                     shift_mm = DVec3::from_array(level.shift_mm);
                     if die {
                         // A die is its part turned half round Y and moved right by the width, M p + w: with the part's
@@ -224,12 +245,15 @@ impl Part {
         let lattice = self.whole.lattice();
         let step_mm = lattice.step_mm;
         let start = |mm: f64| (mm / step_mm).round() as i64;
-        let window = crate::grid::Window {
-            column: start(tile.x_mm),
-            row: start(tile.y_mm),
-            columns: (start(tile.x_mm + tile.width_mm) - start(tile.x_mm)).max(1) as usize,
-            rows: (start(tile.y_mm + tile.height_mm) - start(tile.y_mm)).max(1) as usize,
+        // At the part's own end the last sample need not stand for a whole step.
+        let end = |mm: f64, size_mm: f64, count: usize| match mm > size_mm - 1e-6 * step_mm {
+            true => count as i64,
+            false => start(mm),
         };
+        let (column, row) = (start(tile.x_mm), start(tile.y_mm));
+        let columns = end(tile.x_mm + tile.width_mm, lattice.width_mm, lattice.columns) - column;
+        let rows = end(tile.y_mm + tile.height_mm, lattice.height_mm, lattice.rows) - row;
+        let window = Window { column, row, columns: columns.max(1) as usize, rows: rows.max(1) as usize };
         let one_sheet = job.stock.blanks == Blanks::One;
         let mut whole = Arc::clone(&self.whole);
         if one_sheet && job.part.edge == Edge::Wall {
@@ -257,12 +281,14 @@ impl Part {
         if job.part.form == Form::Die {
             return None;
         }
-        let corner_m = DVec3::new(
-            f64::from(design.core.c0) * design.cell_mm * 1e-3 - 0.5 * scene.width_m,
-            f64::from(design.core.r0) * design.cell_mm * 1e-3 - 0.5 * scene.height_m,
-            self.whole.top_mm() * 1e-3,
-        );
-        Some(Pose { origin_m: corner_m + tile.origin_mm * 1e-3, rotation: tile.rotation })
+        let Turned { back, shift_mm } =
+            self.turned.unwrap_or(Turned { back: DMat3::IDENTITY, shift_mm: DVec3::ZERO });
+        let centre_m = 0.5 * DVec3::new(scene.width_m, scene.height_m, 0.0);
+        let corner_mm =
+            DVec3::new(f64::from(design.core.c0), f64::from(design.core.r0), 0.0) * design.cell_mm;
+        let origin_mm = tile.origin_mm + DVec3::new(0.0, 0.0, self.whole.top_mm()) - shift_mm;
+        let origin_m = (corner_mm + back * origin_mm) * 1e-3 - centre_m;
+        Some(Pose { origin_m, rotation: back * tile.rotation })
     }
 }
 
@@ -272,6 +298,13 @@ fn wedge(job: &Job, level: &surface::Level) -> [f64; 2] {
         Form::Part => [level.about_x_deg, level.about_y_deg],
         Form::Die => [-level.about_x_deg, level.about_y_deg],
     }
+}
+
+/// The rotation that puts a levelled part back.
+fn back(level: &surface::Level) -> DMat3 {
+    // Columns of the transpose are the rows of the rotation.
+    let rows = level.rotation.map(DVec3::from_array);
+    DMat3::from_cols(rows[0], rows[1], rows[2])
 }
 
 fn undercuts(level: &surface::Level) -> Option<Undercuts> {
