@@ -28,6 +28,7 @@ pub mod optics;
 pub mod progress;
 pub mod settings;
 pub mod tolerance;
+pub mod whole;
 
 pub mod screen;
 

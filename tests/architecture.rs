@@ -4,10 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom; a room imports from rooms above it only.
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 22] = [
     "settings",
     "catalogue",
     "progress",
+    "whole",
     "grid",
     "tolerance",
     "cutter",

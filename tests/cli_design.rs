@@ -146,6 +146,78 @@ fn a_refusal_is_one_message_and_leaves_nothing_behind() {
     assert!(is_empty(folder.path()));
 }
 
+/// The command with files of at most so many bytes, as on a disk that is full.
+#[cfg(unix)]
+fn on_a_full_disk(kib: u32, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    let program = assert_cmd::cargo::cargo_bin("screenmill");
+    let limited = format!("trap '' XFSZ; ulimit -f {}; exec \"$0\" \"$@\"", 2 * kib);
+    Command::new("sh").args(["-c", &limited]).arg(program).args(arguments).assert()
+}
+
+#[test]
+#[cfg(unix)]
+fn a_full_disk_leaves_neither_of_two_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = coarse(folder.path(), "\"poisson\"", "\"flat\"");
+    let out = tempfile::tempdir().expect("a folder");
+    let [npz, stl, png] = ["a.npz", "a.stl", "m.png"].map(|name| out.path().join(name));
+    let [npz, stl, png] = [&npz, &stl, &png].map(|path| path.to_str().expect("text"));
+    let two = ["design", &scene, "--out", npz, "--stl", stl, "--cells", "0", "0", "2", "2", "--quiet"];
+    for kib in [0, 40] {
+        on_a_full_disk(kib, &two).code(2).stderr(predicate::str::is_match("^error: .*a.stl cannot be written: File too large .*; hint: its folder must be writable and have room\n$").expect("a pattern"));
+        assert!(is_empty(out.path()));
+    }
+    on_a_full_disk(8, &[&two[..4], &two[6..]].concat())
+        .code(2)
+        .stderr(predicate::str::contains("a.npz cannot be written: File too large"));
+    on_a_full_disk(4, &["calibrate", &scene, "--out", png, "--pixels", "300", "150"])
+        .code(2)
+        .stderr(predicate::str::contains(".png: File too large"));
+    let within = out.path().join("figures");
+    on_a_full_disk(4, &["limits", &scene, "--out", within.to_str().expect("text"), "--quiet"])
+        .code(2)
+        .stderr(predicate::str::contains("figures/design-space.png: File too large"));
+    assert!(is_empty(out.path()));
+}
+
+#[test]
+#[cfg(unix)]
+fn what_is_no_file_is_not_replaced_by_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("a.npz");
+    std::process::Command::new("mkfifo").arg(&pipe).status().expect("a pipe");
+    design(&[&sample("theatre"), "--out", pipe.to_str().expect("text")])
+        .code(2)
+        .stderr(predicate::str::contains("it is a device and no file"));
+    assert!(!fs::metadata(&pipe).expect("still there").is_file());
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_design_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = coarse(folder.path(), "facets = 200", "facets = 3000");
+    let out = tempfile::tempdir().expect("a folder");
+    let [npz, stl] = ["a.npz", "a.stl"].map(|name| out.path().join(name));
+    let program = std::process::Command::new(assert_cmd::cargo::cargo_bin("screenmill"))
+        .args(["design", &scene, "--quiet", "--out"])
+        .arg(&npz)
+        .arg("--stl")
+        .arg(&stl)
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("started");
+    while is_empty(out.path()) {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let kill = std::process::Command::new("kill").args(["-INT", &program.id().to_string()]).status();
+    assert!(kill.expect("sent").success());
+    let ended = program.wait_with_output().expect("ended");
+    assert_eq!(ended.status.code(), Some(2));
+    assert_eq!(String::from_utf8_lossy(&ended.stderr), "error: interrupted; nothing was written\n");
+    assert!(is_empty(out.path()));
+}
+
 #[test]
 fn a_screen_within_its_limits_says_what_would_break_first() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
-use screenmill::progress::Progress;
+use screenmill::progress::Progress as _;
 use screenmill::report::mask::{self, Depth};
 use screenmill::screen::{self, Scene};
+use screenmill::whole::publish_all;
 use serde_json::json;
 
 use super::console::Console;
@@ -43,6 +44,8 @@ pub struct Arguments {
 enum Unusable {
     #[error("{path} is not a .png; hint: --out MASK.png")]
     Kind { path: String },
+    #[error("{path} cannot be written: {source}; hint: its folder must be writable and have room")]
+    Unwritable { path: String, source: std::io::Error },
     #[error("--pixels {columns} {rows}: a mask has 1 to {MOST_PIXELS} columns and rows")]
     Pixels { columns: u32, rows: u32 },
     #[error(
@@ -97,7 +100,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     };
     console.begin("light that each place needs", 1);
     let calibration = screen::calibrate(&scene, elevation.as_ref())?;
-    console.begin("mask", 1);
     let pixel = |column: u32, row: u32| {
         let x = left + (right - left) * (f64::from(column) + 0.5) / f64::from(columns);
         let y = top - (top - bottom) * (f64::from(row) + 0.5) / f64::from(rows);
@@ -107,16 +109,15 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         }
         calibration.mask(DVec2::new(x, y)).powf(1.0 / gamma)
     };
-    if console.interrupted() {
-        return Err(screenmill::pipeline::Error::Interrupted.into());
-    }
     let eight = beside(&arguments.out);
-    mask::write(&eight, [columns, rows], Depth::Eight, &pixel)?;
-    if let Err(error) = mask::write(&arguments.out, [columns, rows], Depth::Sixteen, &pixel) {
-        // Half a pair is no answer.
-        let _ = std::fs::remove_file(&eight);
-        return Err(error.into());
+    let mut masks = Vec::new();
+    for (path, depth) in [(&eight, Depth::Eight), (&arguments.out, Depth::Sixteen)] {
+        let mask = mask::write(path, [columns, rows], depth, &pixel, &console)?;
+        masks.push(mask.ok_or(screenmill::pipeline::Error::Interrupted)?);
     }
+    // Half a pair is no answer.
+    publish_all(masks)
+        .map_err(|(path, source)| Unusable::Unwritable { path: path.display().to_string(), source })?;
     console.times();
     let figures = &calibration.figures;
     if common.json {

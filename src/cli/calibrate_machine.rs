@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use screenmill::machine::Machine;
 use screenmill::pipeline::{Measured, calibrate_machine, programs_to_measure};
 use screenmill::post::Dialect;
+use screenmill::whole::Whole;
 use serde_json::json;
 
 use super::program::clock;
@@ -145,14 +146,7 @@ fn profile(
 /// A file that appears whole or not at all.
 fn place(path: &Path, bytes: &[u8]) -> Result<(), Refused> {
     let refused = |source| Refused::Output { path: path.into(), source };
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(refused)?;
+    let mut file = Whole::beside(path).map_err(refused)?;
     std::io::Write::write_all(&mut file, bytes).map_err(refused)?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file().set_permissions(fs::Permissions::from_mode(0o644)).map_err(refused)?;
-    }
-    file.persist(path).map_err(|error| refused(error.error))?;
-    Ok(())
+    file.publish().map_err(refused)
 }

@@ -11,7 +11,7 @@ use screenmill::progress::Progress;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Folders that hold unfinished outputs.
+/// Folders that hold unfinished outputs, and such files.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// How long a stage may take to notice an interrupt before the program ends without it.
@@ -23,9 +23,9 @@ pub fn listen_for_interrupt() -> Result<(), ctrlc::Error> {
     ctrlc::set_handler(|| {
         INTERRUPTED.store(true, Ordering::SeqCst);
         std::thread::sleep(PATIENCE);
-        for folder in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+        for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
             // What cannot be removed keeps its hidden name.
-            let _ = std::fs::remove_dir_all(folder);
+            let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
         }
         eprintln!("error: {}", screenmill::pipeline::Error::Interrupted);
         std::process::exit(2);
@@ -37,9 +37,9 @@ pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::SeqCst)
 }
 
-/// Has a folder removed if the program is interrupted, until [`finished`].
-pub fn unfinished(folder: &Path) {
-    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).push(folder.to_path_buf());
+/// Has a folder or a file removed if the program is interrupted, until [`finished`].
+pub fn unfinished(path: &Path) {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_path_buf());
 }
 
 /// Leaves a folder alone again.

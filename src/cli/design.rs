@@ -10,6 +10,7 @@ use screenmill::progress::Progress;
 use screenmill::screen::{
     self, AreaError, CellRange, DesignWriter, Elevation, Frame, Profile, Scene, Seam, SolidWriter, Stitching,
 };
+use screenmill::whole::{Whole, publish_all};
 use serde_json::json;
 
 use super::{Common, Outcome, Refusal, console};
@@ -61,7 +62,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let mut made = Made::new(frame);
     let watch = Watch::new(common.quiet, frame.extent.columns() * frame.extent.rows());
     let mut writer = DesignWriter::create(&arguments.out, &frame)?;
+    console::unfinished(writer.hidden());
     let mut solids = arguments.stl.as_ref().map(|stl| SolidWriter::create(stl, &frame)).transpose()?;
+    if let Some(solids) = &solids {
+        console::unfinished(solids.hidden());
+    }
     let mut stitching = (frame.seam == Seam::Stitched).then(|| Stitching::new(&frame));
     screen::design_streamed::<Refusal>(&scene, &frame, elevation.as_ref(), &watch, &mut |cell| {
         made.count(&cell);
@@ -80,10 +85,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     })?;
     made.area_error = stitching.map(Stitching::finish);
     watch.begin("writing", 0);
-    if let Some(solids) = solids {
-        solids.finish()?;
-    }
-    writer.finish()?;
+    let solids = solids.map(SolidWriter::finish).transpose()?;
+    let files = std::iter::once(writer.finish()?).chain(solids);
+    publish_all(files)
+        .map_err(|(path, source)| Unwritable::Parent { path: path.display().to_string(), source })?;
     let times = watch.times();
     if common.verbose {
         for (stage, time) in times {
@@ -138,8 +143,7 @@ fn writable(path: &Path) -> Result<(), Unwritable> {
     if path.is_dir() {
         return Err(Unwritable::Folder { path: name });
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    tempfile::tempfile_in(folder).map(|_| ()).map_err(|source| Unwritable::Parent { path: name, source })
+    Whole::beside(path).map(drop).map_err(|source| Unwritable::Parent { path: name, source })
 }
 
 /// Cells that are done, on a bar on a terminal or a line at every tenth elsewhere, and how long each
@@ -233,7 +237,7 @@ fn summarise(scene: &Scene, made: &Made, arguments: &Arguments, json: bool) {
             "width_mm": width_mm, "height_mm": height_mm, "profile": profile, "seam": seam,
             "facets": facets, "facets_per_cell": [fewest, most],
             "elevation_mm": [low, high], "bare_mm": bare,
-            "stitched_area_error": made.area_error.map(|error| json!({"rms": error.rms, "worst": error.worst})),
+            "stitched_area_error": made.area_error.map(|error| json!({"rms": error.rms, "worst": error.worst, "lost": error.lost})),
         });
         println!("{summary}");
         return;
@@ -245,7 +249,7 @@ fn summarise(scene: &Scene, made: &Made, arguments: &Arguments, json: bool) {
     let per_cell = if fewest == most { format!("{most}") } else { format!("{fewest} to {most}") };
     println!("{per_cell} facets a cell, {facets} in all; profile {profile}, seam {seam}");
     println!("elevation {low:.3} to {high:.3} mm");
-    if let Some(AreaError { rms, worst }) = made.area_error {
+    if let Some(AreaError { rms, worst, lost }) = made.area_error {
         let sweeps = match scene.microgeometry.area_sweeps {
             0 => "where their planes meet".to_string(),
             1 => "after 1 sweep".to_string(),
@@ -256,6 +260,11 @@ fn summarise(scene: &Scene, made: &Made, arguments: &Arguments, json: bool) {
             1e2 * rms,
             1e2 * worst
         );
+        if lost > 0 {
+            println!(
+                "{lost} of them are wholly under other facets: their cells' bases do not meet, or they are small and lie at a seam"
+            );
+        }
     }
     if bare != [0.0, 0.0] {
         println!(

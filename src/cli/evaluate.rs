@@ -31,7 +31,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let found = evaluate(&scene, &console)?.ok_or_else(interrupted)?;
     console.begin("figures", 1);
     let title = arguments.scene.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let mut files = evaluation::write(staging.path(), &title, &found)?;
+    let mut files = evaluation::write(staging.path(), &title, &found).map_err(|e| staging.named(e))?;
     if console.interrupted() {
         return Err(interrupted().into());
     }
@@ -47,7 +47,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         "audience": { "height_m": found.map.height_m, "mean_gain": audience_gain, "deviation": audience_deviation },
         "misalignment": found.tolerance, "acuity": found.acuity, "files": files,
     });
-    write_json(&staging.path().join("evaluation.json"), &report)?;
+    write_json(&staging.path().join("evaluation.json"), &report).map_err(|e| staging.named(e))?;
     staging.publish(&["figures", "data", "evaluation.html", "evaluation.json"])?;
     console.times();
     if common.json {

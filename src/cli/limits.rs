@@ -71,13 +71,16 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     if let Some(staging) = &staging {
         console.begin("figures", 1);
         let at = |name: &str| staging.path().join(name);
+        let named = |error| staging.named(error);
         let size_m = [scene.width_m, scene.height_m];
-        files.extend(design_space::write(&at("design-space"), &title, &flat)?);
-        files.extend(design_space::write_map(&at("margin"), &title, &flat, size_m)?);
+        files.extend(design_space::write(&at("design-space"), &title, &flat).map_err(named)?);
+        files.extend(design_space::write_map(&at("margin"), &title, &flat, size_m).map_err(named)?);
         if let Some(elevated) = &elevated {
             let title = format!("{title}, elevated");
-            files.extend(design_space::write(&at("design-space-elevated"), &title, elevated)?);
-            files.extend(design_space::write_map(&at("margin-elevated"), &title, elevated, size_m)?);
+            files.extend(design_space::write(&at("design-space-elevated"), &title, elevated).map_err(named)?);
+            files.extend(
+                design_space::write_map(&at("margin-elevated"), &title, elevated, size_m).map_err(named)?,
+            );
         }
         files.push("limits.json".into());
     }
@@ -88,7 +91,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         "flat": flat, "elevated": elevated, "acuity": acuity, "notes": notes, "files": files,
     });
     if let Some(staging) = staging {
-        write_json(&staging.path().join("limits.json"), &report)?;
+        write_json(&staging.path().join("limits.json"), &report).map_err(|e| staging.named(e))?;
         staging.publish(&OUTPUTS)?;
     }
     console.times();

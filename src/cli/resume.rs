@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use screenmill::machine::Machine;
 use screenmill::resume;
+use screenmill::whole::Whole;
 use serde_json::json;
 
 use super::program::reading_options;
@@ -92,9 +93,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
 /// Whole or not at all.
 fn write(out: &Path, text: &[u8]) -> Result<(), Refused> {
     let refused = |source| Refused::File { path: out.to_path_buf(), source };
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(refused)?;
+    let mut file = Whole::beside(out).map_err(refused)?;
     file.write_all(text).map_err(refused)?;
-    file.persist(out).map_err(|error| refused(error.error))?;
-    Ok(())
+    file.publish().map_err(refused)
 }

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use screenmill::pipeline::Error;
+use screenmill::report;
 use tempfile::TempDir;
 
 use super::console;
@@ -30,6 +31,19 @@ impl Staging {
 
     pub fn path(&self) -> &Path {
         self.folder.path()
+    }
+
+    /// The same refusal with files named where they would have ended up.
+    pub fn named(&self, error: report::Error) -> report::Error {
+        let at_last = |path: String| match Path::new(&path).strip_prefix(self.folder.path()) {
+            Ok(name) => self.out.join(name).display().to_string(),
+            Err(_) => path,
+        };
+        match error {
+            report::Error::Io { path, source } => report::Error::Io { path: at_last(path), source },
+            report::Error::Figure { path, source } => report::Error::Figure { path: at_last(path), source },
+            other => other,
+        }
     }
 
     /// Puts these under their final names; what an earlier run left there goes first.

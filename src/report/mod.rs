@@ -20,7 +20,7 @@ pub mod setup_sheet;
 mod template;
 mod test_image;
 
-pub use files::{write_json, write_whole};
+pub use files::{write_beside, write_json, write_whole};
 pub use schema::{
     Bounds, ByCause, Fidelity, Finding, GougeBudget, Light, MapFiles, Part, Parts, Polished, Program, Report,
     Severity, Tile, Times, Verdict, finding,

@@ -2,37 +2,29 @@
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use npyz::{DType, NpyFile, Order, TypeChar, WriterBuilder};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::{Cell, CellRange, Design, Elevation, Facet, Frame, Profile, Seam};
+use crate::whole::{Whole, folder};
 
 /// Most bytes that one array may hold.
 const MOST_BYTES: u64 = 1 << 34;
 /// What an archive's member may hold without the larger fields of a zip64, with room for a header.
 const MOST_BYTES_OF_A_SMALL_FILE: u64 = (1 << 32) - (1 << 16);
 
-/// An empty file in the folder of `path`, to be renamed to it when whole. Its mode is that of any new
-/// file.
-pub(super) fn beside(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.prefix(".screenmill-").tempfile_in(folder(path))
-}
-
-pub(super) fn folder(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// Why a container or an elevation file was not read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ContainerError {
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
+    #[error("{path} cannot be written: {source}; hint: its folder must be writable and have room")]
+    Unwritable { path: String, source: std::io::Error },
+    #[error("{path} is no .npy file: {source}; hint: numpy.save writes them")]
+    NoArray { path: String, source: std::io::Error },
     #[error(
         "{path} is no complete .npz archive: {source}; hint: it may be cut off, write it again with screenmill design"
     )]
@@ -77,7 +69,9 @@ pub enum ContainerError {
 /// container, since its arrays stand in it one after the other; what is kept in memory is 20 bytes a cell.
 pub struct DesignWriter {
     frame: Frame,
-    path: PathBuf,
+    /// The container as errors name it.
+    name: String,
+    file: Whole,
     cells: Vec<[i32; 2]>,
     elevation_mm: Vec<f64>,
     facet_start: Vec<i64>,
@@ -108,15 +102,15 @@ impl Spool {
 }
 
 impl DesignWriter {
-    /// Begins a container. Nothing stands under `path` until [`DesignWriter::finish`].
+    /// Begins a container. Nothing stands under `path` until what [`DesignWriter::finish`] gives is published.
     pub fn create(path: &Path, frame: &Frame) -> Result<DesignWriter, ContainerError> {
-        let spool = || {
-            Spool::beside(path)
-                .map_err(|source| ContainerError::Io { path: path.display().to_string(), source })
-        };
+        let name = || path.display().to_string();
+        let unwritable = |source| ContainerError::Unwritable { path: name(), source };
+        let spool = || Spool::beside(path).map_err(unwritable);
         Ok(DesignWriter {
             frame: *frame,
-            path: path.to_path_buf(),
+            name: name(),
+            file: Whole::beside(path).map_err(unwritable)?,
             cells: Vec::new(),
             elevation_mm: Vec::new(),
             facet_start: vec![0],
@@ -128,7 +122,12 @@ impl DesignWriter {
 
     /// Appends the next cell, by row, then column.
     pub fn push(&mut self, cell: &Cell) -> Result<(), ContainerError> {
-        self.put(cell).map_err(|source| ContainerError::Io { path: self.path.display().to_string(), source })
+        self.put(cell).map_err(|source| ContainerError::Unwritable { path: self.name.clone(), source })
+    }
+
+    /// Where the container is until it has its name.
+    pub fn hidden(&self) -> &Path {
+        self.file.hidden()
     }
 
     fn put(&mut self, cell: &Cell) -> std::io::Result<()> {
@@ -145,24 +144,18 @@ impl DesignWriter {
         Ok(())
     }
 
-    /// Puts the container under its name.
-    pub fn finish(self) -> Result<(), ContainerError> {
-        let path = self.path.clone();
-        let name = || path.display().to_string();
-        let io = |source| ContainerError::Io { path: name(), source };
-        let file = beside(&path).map_err(io)?;
-        let mut zip = ZipWriter::new(BufWriter::with_capacity(1 << 18, file));
-        self.write_arrays(&mut zip).map_err(io)?;
-        let buffer = zip.finish().map_err(|source| ContainerError::Archive { path: name(), source })?;
-        let file = buffer.into_inner().map_err(|e| io(e.into_error()))?;
-        file.persist(&path).map_err(|e| io(e.error))?;
-        Ok(())
+    /// The whole container, to be put under its name.
+    pub fn finish(self) -> Result<Whole, ContainerError> {
+        let name = self.name.clone();
+        self.archived().map_err(|source| ContainerError::Unwritable { path: name, source })
     }
 
-    fn write_arrays<W: Write + Seek>(self, zip: &mut ZipWriter<W>) -> std::io::Result<()> {
+    fn archived(self) -> std::io::Result<Whole> {
         let n = self.cells.len() as u64;
         let m = self.facet_start.last().copied().unwrap_or(0) as u64;
         let Frame { core: CellRange { c0, r0, c1, r1 }, cell_mm, profile, seam, .. } = self.frame;
+        let mut done = ZipWriter::new(BufWriter::with_capacity(1 << 18, self.file));
+        let zip = &mut done;
         array(zip, "cell", &[n, 2], self.cells.into_iter().flatten())?;
         array(zip, "core", &[4], [c0, r0, c1, r1])?;
         array(zip, "cell_mm", &[], [cell_mm])?;
@@ -172,7 +165,8 @@ impl DesignWriter {
         spooled(zip, "offset_mm", &[m], self.offset)?;
         spooled(zip, "area_mm2", &[m], self.area)?;
         array(zip, "profile", &[], [i32::from(profile == Profile::Dish)])?;
-        array(zip, "seam", &[], [i32::from(seam == Seam::Stitched)])
+        array(zip, "seam", &[], [i32::from(seam == Seam::Stitched)])?;
+        done.finish()?.into_inner().map_err(|error| error.into_error())
     }
 }
 
@@ -184,7 +178,8 @@ impl Design {
         for cell in &self.cells {
             writer.push(cell)?;
         }
-        writer.finish()
+        let unwritable = |source| ContainerError::Unwritable { path: path.display().to_string(), source };
+        writer.finish()?.publish().map_err(unwritable)
     }
 
     /// Reads a container and checks that its arrays fit together.
@@ -320,10 +315,17 @@ impl Elevation {
     pub fn read(path: &Path) -> Result<Elevation, ContainerError> {
         let name = path.display().to_string();
         let io = |source| ContainerError::Io { path: path.display().to_string(), source };
-        let file = File::open(path).map_err(io)?;
+        let mut file = File::open(path).map_err(io)?;
         let held = file.metadata().map_err(io)?.len();
+        let mut magic = [0; 6];
+        let begins = file.read(&mut magic).and_then(|_| file.rewind());
+        begins.map_err(|source| ContainerError::NoArray { path: name.clone(), source })?;
+        if magic != *b"\x93NUMPY" {
+            let source = std::io::Error::other(if held == 0 { "it is empty" } else { "it begins otherwise" });
+            return Err(ContainerError::NoArray { path: name, source });
+        }
         let (z_mm, shape) =
-            numbers(BufReader::new(file), held, "elevation", &name, &[None, None], Numbers::Real)?;
+            numbers(BufReader::new(file), held, "elevation", &name, &[None, None], Numbers::Heights)?;
         Ok(Elevation { columns: shape[1] as usize, rows: shape[0] as usize, z_mm })
     }
 }
@@ -371,6 +373,8 @@ fn begin<W: Write + Seek>(zip: &mut ZipWriter<W>, name: &str, shape: &[u64]) -> 
 enum Numbers {
     Whole,
     Real,
+    /// As real ones, but whoever takes them says which of them are none.
+    Heights,
 }
 
 struct Arrays<'a, R> {
@@ -414,7 +418,8 @@ fn numbers<R: Read>(
     let fits = found.len() == wanted.len()
         && found.iter().zip(wanted).all(|(&have, want)| want.is_none_or(|want| have == want as u64));
     if !fits {
-        let sides: Vec<String> = wanted.iter().map(|w| w.map_or("any".into(), |w| w.to_string())).collect();
+        let sides: Vec<String> =
+            wanted.iter().map(|w| w.map_or("any length".into(), |w| w.to_string())).collect();
         let wanted = format!("[{}]", sides.join(", "));
         return Err(ContainerError::Shape { path: path.into(), array: name, found, wanted });
     }
@@ -441,13 +446,15 @@ fn numbers<R: Read>(
         (Numbers::Whole, TypeChar::Int, 8) => {
             file.into_vec::<i64>().map_err(broken)?.into_iter().map(|v| v as f64).collect()
         }
-        (Numbers::Real, TypeChar::Float, 4) => {
+        (Numbers::Real | Numbers::Heights, TypeChar::Float, 4) => {
             file.into_vec::<f32>().map_err(broken)?.into_iter().map(f64::from).collect()
         }
-        (Numbers::Real, TypeChar::Float, 8) => file.into_vec::<f64>().map_err(broken)?,
+        (Numbers::Real | Numbers::Heights, TypeChar::Float, 8) => file.into_vec::<f64>().map_err(broken)?,
         _ => return Err(refuse(scalar.to_string())),
     };
-    if let Some(index) = values.iter().position(|v| !v.is_finite()) {
+    if kind != Numbers::Heights
+        && let Some(index) = values.iter().position(|v| !v.is_finite())
+    {
         return Err(ContainerError::Value {
             path: path.into(),
             array: name,

@@ -2,15 +2,15 @@
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::container::{beside, folder};
 use super::power::Diagram;
 use super::rows::Rows;
 use super::top::{Sketch, Square, Top};
 use super::{Cell, Design, Frame, Seam};
+use crate::whole::{Whole, folder};
 
 /// Metal under the lowest point, in mm.
 const BASE_MM: f64 = 1.0;
@@ -20,7 +20,7 @@ const HEADER: usize = 84;
 /// Why a solid was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum SolidError {
-    #[error("{path}: {source}")]
+    #[error("{path} cannot be written: {source}; hint: its folder must be writable and have room")]
     Io { path: String, source: std::io::Error },
     #[error(
         "{triangles} triangles and more do not fit into an .stl, which counts to {most}; hint: fewer cells with --cells"
@@ -36,8 +36,9 @@ pub enum SolidError {
 /// of cells that a row needs; the outline waits on disk for the base, which is known at the end.
 pub struct SolidWriter {
     frame: Frame,
-    path: PathBuf,
-    out: BufWriter<tempfile::NamedTempFile>,
+    /// The solid as errors name it.
+    name: String,
+    out: BufWriter<Whole>,
     triangles: u64,
     rows: Rows,
     /// Upper sides of the row of squares below, if stitched.
@@ -59,20 +60,21 @@ impl Design {
         for cell in &self.cells {
             writer.push(cell)?;
         }
-        writer.finish()
+        let failed = |source| SolidError::Io { path: path.display().to_string(), source };
+        writer.finish()?.publish().map_err(failed)
     }
 }
 
 impl SolidWriter {
-    /// Begins a solid. Nothing stands under `path` until [`SolidWriter::finish`].
+    /// Begins a solid. Nothing stands under `path` until what [`SolidWriter::finish`] gives is published.
     pub fn create(path: &Path, frame: &Frame) -> Result<SolidWriter, SolidError> {
         let io = |source| SolidError::Io { path: path.display().to_string(), source };
-        let mut out = BufWriter::with_capacity(1 << 18, beside(path).map_err(io)?);
+        let mut out = BufWriter::with_capacity(1 << 18, Whole::beside(path).map_err(io)?);
         out.write_all(&[0; HEADER]).map_err(io)?;
         let outlines = tempfile::tempfile_in(folder(path)).map_err(io)?;
         Ok(SolidWriter {
             frame: *frame,
-            path: path.to_path_buf(),
+            name: path.display().to_string(),
             out,
             triangles: 0,
             rows: Rows::new(frame),
@@ -87,13 +89,18 @@ impl SolidWriter {
         self.rows.push(cell).map_or(Ok(()), |row| self.write_row(row))
     }
 
-    /// Puts the file under its name.
-    pub fn finish(mut self) -> Result<(), SolidError> {
+    /// Where the file is until it has its name.
+    pub fn hidden(&self) -> &Path {
+        self.out.get_ref().hidden()
+    }
+
+    /// The whole file, to be put under its name.
+    pub fn finish(mut self) -> Result<Whole, SolidError> {
         if let Some(row) = self.rows.last() {
             self.write_row(row)?;
         }
-        let path = self.path.clone();
-        let io = |source| SolidError::Io { path: path.display().to_string(), source };
+        let name = self.name.clone();
+        let io = |source| SolidError::Io { path: name.clone(), source };
         let base = (f64::from(self.lowest) - BASE_MM) as f32;
         let SolidWriter { mut out, outlines, mut triangles, .. } = self;
         let mut outlines = outlines.into_inner().map_err(|e| io(e.into_error()))?;
@@ -109,9 +116,7 @@ impl SolidWriter {
         let count = u32::try_from(triangles).map_err(|_| SolidError::TooMany { triangles, most })?;
         out.seek(SeekFrom::Start(HEADER as u64 - 4)).map_err(io)?;
         out.write_all(&count.to_le_bytes()).map_err(io)?;
-        let file = out.into_inner().map_err(|e| io(e.into_error()))?;
-        file.persist(&path).map_err(|e| io(e.error))?;
-        Ok(())
+        out.into_inner().map_err(|e| io(e.into_error()))
     }
 
     /// Writes the tops of one row of squares.
@@ -144,7 +149,7 @@ impl SolidWriter {
                 Some((top, Outline { sides: sides.map(<[_]>::to_vec), wall }))
             })
             .collect();
-        let io = |source| SolidError::Io { path: self.path.display().to_string(), source };
+        let io = |source| SolidError::Io { path: self.name.clone(), source };
         for (top, column) in tops.into_iter().zip(columns) {
             let (top, outline) = top.ok_or(SolidError::NoMesh { column, row })?;
             for corners in &top.triangles {

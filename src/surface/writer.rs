@@ -2,14 +2,14 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use npyz::WriterBuilder;
-use tempfile::NamedTempFile;
 
 use super::Error;
 use super::raw::claim;
 use crate::grid::Heights;
+use crate::whole::{Whole, folder};
 
 /// Bytes of the strips of a TIFF, about.
 const STRIP_BYTES: u64 = 1 << 20;
@@ -17,9 +17,8 @@ const STRIP_BYTES: u64 = 1 << 20;
 /// Writes heights of any size to `.tif`, `.npy` or 16-bit `.png`, by the extension. The bytes
 /// depend on the heights alone, not on the bands they came in.
 pub struct HeightWriter {
-    path: PathBuf,
     name: String,
-    file: NamedTempFile,
+    file: Whole,
     columns: usize,
     rows: usize,
     given: usize,
@@ -61,29 +60,17 @@ impl HeightWriter {
         };
         claim(&name, columns as u64, rows as u64, 4)?;
         let io = |source| Error::Unwritable { path: name.clone(), source };
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        if path.is_dir() {
-            return Err(io(std::io::ErrorKind::IsADirectory.into()));
-        }
-        let free = fs4::available_space(folder).map_err(io)?;
+        let free = fs4::available_space(folder(path)).map_err(io)?;
         let wanted = columns as u64 * rows as u64 * if kind == Kind::Png { 2 } else { 4 };
         if wanted > free {
             return Err(Error::NoSpaceToWrite { path: name, wanted, free });
         }
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".screenmill-");
-        // What tempfile makes is private; a finished file is as readable as any other.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file = builder.tempfile_in(folder).map_err(io)?;
+        let mut file = Whole::beside(path).map_err(io)?;
         let format = match kind {
             Kind::Tiff => {
                 let head = tiff_head(columns as u64, rows as u64, step_mm);
                 file.write_all(&head).map_err(io)?;
-                file.as_file().set_len(head.len() as u64 + wanted).map_err(io)?;
+                file.file_mut().set_len(head.len() as u64 + wanted).map_err(io)?;
                 Format::Tiff { data: head.len() as u64 }
             }
             Kind::Npy => {
@@ -92,7 +79,7 @@ impl HeightWriter {
                 npyz::WriteOptions::new_header_only()
                     .dtype(npyz::DType::new_scalar(kind))
                     .shape(&[rows as u64, columns as u64])
-                    .writer(file.as_file_mut())
+                    .writer(file.file_mut())
                     .write_header_only()
                     .map_err(io)?;
                 Format::Npy
@@ -105,11 +92,10 @@ impl HeightWriter {
                 if !(z_max_mm > z_min_mm && (z_max_mm - z_min_mm).is_finite()) {
                     return Err(Error::BadRange { path: name, z_min_mm, z_max_mm });
                 }
-                Format::Png { z_range_mm, values: tempfile::tempfile_in(folder).map_err(io)? }
+                Format::Png { z_range_mm, values: tempfile::tempfile_in(folder(path)).map_err(io)? }
             }
         };
-        let path = path.to_owned();
-        Ok(HeightWriter { path, name, file, columns, rows, given: 0, format, buffer: Vec::new() })
+        Ok(HeightWriter { name, file, columns, rows, given: 0, format, buffer: Vec::new() })
     }
 
     /// The next rows. Bands follow each other from row 0 up and are as wide as the file.
@@ -129,7 +115,7 @@ impl HeightWriter {
                 }
                 let row = (self.rows - self.given - band.window.rows) as u64;
                 let place = *data + row * self.columns as u64 * 4;
-                let file = self.file.as_file_mut();
+                let file = self.file.file_mut();
                 file.seek(SeekFrom::Start(place)).map_err(io)?;
                 file.write_all(&self.buffer).map_err(io)?;
             }
@@ -170,11 +156,10 @@ impl HeightWriter {
         }
         let io = |source| Error::Unwritable { path: self.name.clone(), source };
         if let Format::Png { values, .. } = &mut self.format {
-            encode_png(self.file.as_file_mut(), values, self.columns, self.rows).map_err(io)?;
+            encode_png(self.file.file_mut(), values, self.columns, self.rows).map_err(io)?;
         }
-        self.file.as_file_mut().flush().map_err(io)?;
-        self.file.persist(&self.path).map_err(|error| io(error.error))?;
-        Ok(())
+        self.file.flush().map_err(io)?;
+        self.file.publish().map_err(io)
     }
 }
 
