@@ -5,6 +5,8 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
+use screenmill::evaluation::evaluate;
+use screenmill::progress::Silent;
 use screenmill::screen::{self, CellRange, Design, Elevation, Scene};
 
 fn theatre() -> String {
@@ -93,6 +95,17 @@ fn scenes_that_are_wrong_are_refused_with_their_line() {
         ("reflector-twice", changed("material = \"aluminium\"", "material = \"aluminium\"\nn = 1.0")),
         ("reflector-half", changed("material = \"aluminium\"", "n = 1.0")),
         ("reflector-none", changed("material = \"aluminium\"", "roughness = 0.1")),
+        ("reflector-of-air", changed("material = \"aluminium\"", "n = 1.0\nk = 0.0")),
+        ("reflector-zero", changed("material = \"aluminium\"", "n = 0.0\nk = 6.4")),
+        ("reflector-nan", changed("material = \"aluminium\"", "n = nan\nk = 6.4")),
+        ("reflector-huge", changed("material = \"aluminium\"", "n = 1.0\nk = 1e300")),
+        ("reflector-in-words", changed("material = \"aluminium\"", "n = \"one\"\nk = 6.4")),
+        ("width-zero", changed("width_mm = 4.0", "width_mm = 0.0")),
+        ("width-nan", changed("width_mm = 4.0", "width_mm = nan")),
+        ("facets-and-a-half", changed("facets = 200", "facets = 2.5")),
+        ("facets-too-many", changed("facets = 200", "facets = 4001")),
+        ("projector-far-away", changed("[0.0, 0.0, 3.0]", "[0.0, 0.0, 1e9]")),
+        ("corner-nan", changed("[-1.0, -0.65, 2.0]", "[-1.0, nan, 2.0]")),
         ("reflector-unphysical", changed("material = \"aluminium\"", "n = 1.0\nk = -6.4")),
         ("no-audience", with_audience("").replacen("schema = 1", "schema = 1\naudience = []", 1)),
         ("no-audience-key", with_audience("")),
@@ -176,7 +189,48 @@ fn designs_that_cannot_be_made_are_refused() {
     );
     refuse("elevation-nan", &scene, range(0, 0, 1, 1), Some(&given(f64::NAN)));
     refuse("behind-the-projector", &flat, range(0, 0, 1, 1), Some(&given(3500.0)));
+    let near = Scene::parse(&changed("[0.0, 0.0, 3.0]", "[0.0, 0.0, 0.1]"), "screen.toml").expect("a scene");
+    refuse("projector-too-near", &near, range(0, 0, 1, 1), None);
+    // What evaluate asks of the same screen is refused as soon: no cell of it is possible.
+    let error = evaluate(&tiny, &Silent).map(|_| ()).expect_err("too small");
+    check(
+        "evaluation-sees-too-little",
+        "a design asked of the theatre, see tests/refuse_screen.rs",
+        &error.to_string(),
+    );
+    let swept = changed("area_tolerance = 1e-6", "area_tolerance = 1e-6\narea_sweeps = 2")
+        .replace("seam = \"step\"", "seam = \"stitched\"");
+    let swept = Scene::parse(&swept, "screen.toml").expect("a scene");
+    refuse("bases-apart", &swept, range(0, 0, 1, 1), Some(&given(0.0)));
     refuse("inside-the-audience", &flat, range(250, 90, 251, 91), Some(&given(2500.0)));
+}
+
+#[test]
+fn elevation_files_that_are_none_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refuse = |case: &str, bytes: Option<&[u8]>| {
+        let path = folder.path().join(if bytes.is_some() { "e.npy" } else { "" });
+        if let Some(bytes) = bytes {
+            fs::write(&path, bytes).expect("written");
+        }
+        let error = Elevation::read(&path).expect_err(case).to_string();
+        let message = error.replacen(path.to_str().expect("text"), "e.npy", 1);
+        check(case, "a file of elevations with this, see tests/refuse_screen.rs", &message);
+    };
+    let npy = |kind: &str, shape: &str, values: usize| {
+        let head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+        let mut bytes = b"\x93NUMPY\x01\x00v\x00".to_vec();
+        bytes.extend(format!("{head:<117}\n").bytes());
+        bytes.extend(vec![0; 4 * values]);
+        bytes
+    };
+    refuse("elevation-empty", Some(&[]));
+    refuse("elevation-of-another-kind", Some(b"z, mm\n1, 2\n"));
+    refuse("elevation-cut-off", Some(&npy("<f4", "(250, 500)", 77)));
+    refuse("elevation-cut-in-its-head", Some(&npy("<f4", "(250, 500)", 0)[..40]));
+    refuse("elevation-of-one-row", Some(&npy("<f4", "(500,)", 500)));
+    refuse("elevation-of-whole-numbers", Some(&npy("<i4", "(250, 500)", 125_000)));
+    refuse("elevation-is-a-folder", None);
 }
 
 fn archive(change: impl Fn(&mut Design)) -> Vec<u8> {

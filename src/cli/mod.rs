@@ -48,8 +48,8 @@ pub struct Common {
     #[arg(long, global = true)]
     pub quiet: bool,
     /// Worker threads; all cores if left out
-    #[arg(long, global = true, value_name = "N")]
-    pub threads: Option<usize>,
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
     /// Log stages with their times
     #[arg(short, long, global = true)]
     pub verbose: bool,
@@ -92,7 +92,7 @@ pub type Refusal = Box<dyn Error + Send + Sync>;
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     if let Some(threads) = arguments.common.threads {
-        let built = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build_global();
+        let built = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
         if let Err(error) = built {
             eprintln!("error: {error}");
             return ExitCode::from(2);

@@ -1,9 +1,9 @@
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
 use crate::optics::half_vector;
+use crate::progress::in_order;
 use crate::screen::{self, Elevation, Error, Grazing, Scene};
 
 /// A beam's spread over the distance to the next one: wide enough to leave no ripple between them, and so
@@ -164,18 +164,14 @@ fn lights(
     count: usize,
     place: impl Fn(usize) -> (usize, usize) + Sync,
 ) -> Result<Vec<CellLight>, Error> {
-    let made: Vec<Result<CellLight, Error>> = (0..count)
-        .into_par_iter()
-        .map(|at| {
-            let (column, row) = place(at);
-            match elevation {
-                None => CellLight::new(scene, (column, row), 0.0, DVec2::ZERO),
-                Some(elevation) => {
-                    let tilt = screen::base_gradient(scene, elevation, column, row);
-                    CellLight::new(scene, (column, row), 1e-3 * elevation.at(column, row), tilt)
-                }
+    in_order(count, |at| {
+        let (column, row) = place(at);
+        match elevation {
+            None => CellLight::new(scene, (column, row), 0.0, DVec2::ZERO),
+            Some(elevation) => {
+                let tilt = screen::base_gradient(scene, elevation, column, row);
+                CellLight::new(scene, (column, row), 1e-3 * elevation.at(column, row), tilt)
             }
-        })
-        .collect();
-    made.into_iter().collect()
+        }
+    })
 }

@@ -49,6 +49,10 @@ pub enum Error {
         "{path}:{line}: area_sweeps repair cells whose bases meet, and with method = \"flat\" they do not; hint: method = \"poisson\", or leave area_sweeps out"
     )]
     SweepsOfFlat { path: String, line: usize },
+    #[error(
+        "{path}:{line}: a mirror of n = {n}, k = {k} reflects {percent:.4} % of the light; hint: a metal reflects most of it, aluminium has n = 1, k = 6.4"
+    )]
+    NoMirror { path: String, line: usize, n: f64, k: f64, percent: f64 },
     #[error("{path}:{line}: the reflector is {given}; hint: give material = \"aluminium\", or both n and k")]
     Reflector { path: String, line: usize, given: &'static str },
     #[error(
@@ -63,7 +67,11 @@ pub enum Error {
         "{cells} cells of {facets} facets make a container of {gib:.1} GiB, at most {most_gib:.1} GiB are written in one; hint: design parts with --cells C0 R0 C1 R1"
     )]
     TooMuchForAFile { cells: usize, facets: usize, gib: f64, most_gib: f64 },
-    #[error("interrupted, nothing was written")]
+    #[error(
+        "the bases of cells ({column}, {row}) and ({next_column}, {next_row}) are {step_mm:.3} mm apart where they meet, area_sweeps repair cells whose bases are within {most_mm:.3} mm; hint: an elevation whose bases meet, as method = \"poisson\" makes it, or leave area_sweeps out"
+    )]
+    BasesApart { column: i32, row: i32, next_column: i32, next_row: i32, step_mm: f64, most_mm: f64 },
+    #[error("interrupted; nothing was written")]
     Interrupted,
     #[error(
         "cell ({column}, {row}) at ({x_m:.4}, {y_m:.4}, {z_m:.4}) m sees no audience; hint: the audience must be in front of every point of the screen, more than 0.06 degrees above its plane"
@@ -78,7 +86,7 @@ pub enum Error {
     )]
     Inside { column: i32, row: i32, x_m: f64, y_m: f64, z_m: f64, name: String },
     #[error(
-        "cell ({column}, {row}) at z = {z_m:.4} m stands behind the projector at z = {projector_m} m; hint: check the elevation, it is in mm"
+        "cell ({column}, {row}) at z = {z_m:.4} m stands behind the projector at z = {projector_m} m; hint: a projector further from the screen; a given elevation is in mm"
     )]
     BehindProjector { column: i32, row: i32, z_m: f64, projector_m: f64 },
     #[error(

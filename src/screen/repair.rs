@@ -24,6 +24,15 @@ const MOST_LOWERED: f64 = 0.025;
 /// The damping as a part of the mean stiffness. Less reaches further than the cells around, more leaves more.
 const DAMPING: f64 = 1.0 / 150.0;
 
+/// Most that the bases of two neighbours may be apart where they meet, as a part of the cell's width.
+const MOST_APART: f64 = 0.025;
+
+/// Gradient of the base of a cell: that of its facets on the whole.
+fn mean_gradient(cell: &Cell) -> [f64; 2] {
+    let area: f64 = cell.facets.iter().map(|facet| facet.area_mm2).sum();
+    [0, 1].map(|axis| cell.facets.iter().map(|f| f.gradient[axis] * f.area_mm2).sum::<f64>() / area)
+}
+
 /// Cells around one that it depends on: one for uncovering, and for each sweep one whose step counts and
 /// one more for the areas there.
 pub(super) fn rings(sweeps: usize) -> i32 {
@@ -62,7 +71,9 @@ impl Sheet<'_> {
         if sweeps == 0 {
             return Ok(());
         }
-        self.uncover(self.around(target, 2 * sweeps))?;
+        let around = self.around(target, 2 * sweeps);
+        self.refuse_steps(around)?;
+        self.uncover(around)?;
         let mut start = vec![Vec::new(); self.cells.len()];
         for sweep in 0..sweeps {
             // The last two take aim at the areas themselves.
@@ -74,6 +85,29 @@ impl Sheet<'_> {
 
     fn around(&self, target: CellRange, rings: usize) -> CellRange {
         target.grown(rings as i32).within(self.screen.0, self.screen.1)
+    }
+
+    /// Refuses cells whose bases do not meet: one then covers much of the other, and the derivative of what is left
+    /// says little of what to do.
+    fn refuse_steps(&self, range: CellRange) -> Result<(), Error> {
+        let most_mm = MOST_APART * self.cell_mm;
+        for (column, row) in (range.r0..range.r1).flat_map(|r| (range.c0..range.c1).map(move |c| (c, r))) {
+            for (dc, dr) in [(1, 0), (0, 1)] {
+                let (next_column, next_row) = (column + dc, row + dr);
+                let (Some(cell), Some(next)) = (self.cell(column, row), self.cell(next_column, next_row))
+                else {
+                    continue;
+                };
+                // Half a cell along each base.
+                let axis = dr as usize;
+                let climb = 0.5 * self.cell_mm * (mean_gradient(cell)[axis] + mean_gradient(next)[axis]);
+                let step_mm = (next.elevation_mm - cell.elevation_mm - climb).abs();
+                if step_mm > most_mm {
+                    return Err(Error::BasesApart { column, row, next_column, next_row, step_mm, most_mm });
+                }
+            }
+        }
+        Ok(())
     }
 
     fn uncover(&mut self, range: CellRange) -> Result<(), Error> {

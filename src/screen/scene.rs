@@ -16,6 +16,9 @@ pub const MOST_CORNERS: usize = 200;
 /// Most cells of a screen: a cinema's 16 x 7 m has 7 million of 4 mm.
 pub const MOST_CELLS: f64 = 4e7;
 
+/// Least reflectance at normal incidence: areas of facets go by its reciprocal, and air (n = 1, k = 0) has none.
+const LEAST_REFLECTANCE: f64 = 1e-3;
+
 /// Fewest facets whose areas are repaired where cells are stitched: seams that take away most of a
 /// facet are beyond steps by derivatives, and make it worse (measured: 12 do, 50 do not).
 const FEWEST_REPAIRED: f64 = 50.0;
@@ -276,10 +279,17 @@ fn reflector(source: &Source, table: &ReflectorTable) -> Result<Reflector, Error
     let index = match (&table.material, table.n, table.k) {
         (Some(name), None, None) => ComplexIndex::named(name)
             .ok_or_else(|| source.unknown_value("reflector.material", name, &ComplexIndex::names()))?,
-        (None, Some(n), Some(k)) => ComplexIndex {
-            n: source.within("reflector.n", n, 0.01, 100.0)?,
-            k: source.within("reflector.k", k, 0.0, 100.0)?,
-        },
+        (None, Some(n), Some(k)) => {
+            let n = source.within("reflector.n", n, 0.01, 100.0)?;
+            let k = source.within("reflector.k", k, 0.0, 100.0)?;
+            let index = ComplexIndex { n, k };
+            let reflectance = index.reflectance(1.0);
+            if reflectance < LEAST_REFLECTANCE {
+                let (path, line) = (source.path().into(), source.line_of("reflector.n"));
+                return Err(Error::NoMirror { path, line, n, k, percent: 100.0 * reflectance });
+            }
+            index
+        }
         (Some(_), _, _) => return refuse("given twice, by its material and by n or k"),
         (None, None, None) => return refuse("not given"),
         (None, _, _) => return refuse("given by only one of n and k"),

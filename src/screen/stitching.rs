@@ -13,6 +13,8 @@ use super::{Cell, Design, Frame};
 pub struct AreaError {
     pub worst: f64,
     pub rms: f64,
+    /// Facets of which nothing is on the surface.
+    pub lost: usize,
 }
 
 /// Measures stitched cells as they go by, exactly: what of each facet is on the surface.
@@ -21,6 +23,7 @@ pub struct Stitching {
     rows: Rows,
     worst: f64,
     squares: f64,
+    lost: usize,
     facets: usize,
 }
 
@@ -37,7 +40,7 @@ impl Design {
 
 impl Stitching {
     pub fn new(frame: &Frame) -> Stitching {
-        Stitching { frame: *frame, rows: Rows::new(frame), worst: 0.0, squares: 0.0, facets: 0 }
+        Stitching { frame: *frame, rows: Rows::new(frame), worst: 0.0, squares: 0.0, lost: 0, facets: 0 }
     }
 
     /// Takes the next cell, by row, then column, the ring of a stitched design included.
@@ -51,13 +54,15 @@ impl Stitching {
         let errors = self.errors_at_the_end();
         self.count(&errors);
         let rms = (self.squares / self.facets.max(1) as f64).sqrt();
-        AreaError { worst: self.worst, rms }
+        AreaError { worst: self.worst, rms, lost: self.lost }
     }
 
     fn count(&mut self, errors: &[f64]) {
         for error in errors {
             self.worst = self.worst.max(error.abs());
             self.squares += error * error;
+            // None of its area is an error of all of it.
+            self.lost += usize::from(*error <= -1.0);
         }
         self.facets += errors.len();
     }
