@@ -54,9 +54,9 @@ fn convergence() -> Figure {
     }
     Figure {
         title: "Convergence of the areas".into(),
-        subtitle: "cell (300, 150) of the flat screens, from the quadratic start; the paper stops at -2 after about 50 steps".into(),
+        subtitle: "cell (300, 150) of the flat screens, from the quadratic start; the paper stops at 0.01 after about 50 steps".into(),
         x: Axis::new("Newton step", 0.0, 9.0),
-        y: Axis::new("largest relative area error, power of ten", -13.0, 2.0),
+        y: Axis { logarithms: true, ..Axis::new("largest relative error of an area", -13.0, 2.0) },
         layers,
         legend: Legend::UpperRight,
         bar: None,
@@ -106,9 +106,9 @@ fn stitched() -> Vec<Figure> {
             Figure {
                 title: format!("Facet areas once stitched, in {place}"),
                 subtitle: format!(
-                    "dishes, {SIDE} x {SIDE} cells of 200 facets; to the left of a curve all are nearer; {SWEEPS} sweeps"
+                    "dishes, {SIDE} x {SIDE} cells of 200 facets; dashed: after {SWEEPS} sweeps; at the foot areas are kept"
                 ),
-                x: Axis::new("part of the facets, %", 0.0, 100.0),
+                x: Axis::new("facets that are off by less, %", 0.0, 100.0),
                 y: Axis { logarithms: true, ..Axis::new("area off by, %", -2.0, 2.5) },
                 layers,
                 legend: Legend::UpperLeft,

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::screen::{Field, Margins, Opening};
 
 use super::Error;
-use super::figure::{self, Axis, BLUE, Bar, Figure, GREEN, GREY, Layer, Legend, ORANGE, RED, VIOLET};
+use super::figure::{self, Axis, BLACK, BLUE, Bar, Figure, GREEN, GREY, Layer, Legend, ORANGE, RED, VIOLET};
 use super::palette::Palette;
 
 /// Points of the screen along its longer side that the plot shows.
@@ -35,6 +35,11 @@ pub fn write(stem: &Path, title: &str, margins: &Margins) -> Result<Vec<String>,
     };
     let layers = vec![
         Layer::Region { points: valid(low, high), colour: GREY, opacity: 0.22 },
+        Layer::Text {
+            at: (0.56 * MOST_DEG, 0.95 * MOST_DEG),
+            text: "grey: no cell shadows its own light".into(),
+            colour: BLACK,
+        },
         Layer::Line {
             name: "limit for any projector, α + β = 60° (Eq. 11)".into(),
             points: vec![(0.0, 60.0), (60.0, 0.0)],
@@ -64,8 +69,8 @@ pub fn write(stem: &Path, title: &str, margins: &Margins) -> Result<Vec<String>,
     let figure = Figure {
         title: format!("Design space: {title}"),
         subtitle,
-        x: Axis::new("α, degrees", 0.0, MOST_DEG),
-        y: Axis::new("β, degrees", 0.0, MOST_DEG),
+        x: Axis::new("α, degrees: one edge of the audience, measured from the screen's plane", 0.0, MOST_DEG),
+        y: Axis::new("β, degrees: its other edge, from the other side", 0.0, MOST_DEG),
         layers,
         legend: Legend::LowerLeft,
         bar: None,

@@ -443,7 +443,11 @@ fn misalignment(tolerance: &[Tolerance]) -> Vec<Figure> {
         Figure {
             title: titles[at % titles.len()].into(),
             subtitle: if at == 2 { "about x, y, z".into() } else { "along x, y, z".into() },
-            x: Axis::new(three[0].unit, -most, most),
+            x: Axis::new(
+                &format!("{}, {}", ["moved by", "shifted by", "turned by"][at % 3], three[0].unit),
+                -most,
+                most,
+            ),
             y: Axis::new("light on the audience, %", 100.0 * low, 100.0),
             layers: layers.collect(),
             legend: Legend::LowerLeft,

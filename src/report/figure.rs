@@ -22,6 +22,8 @@ const FONT: &str = "Ubuntu, sans-serif";
 const SHARPNESS: u32 = 2;
 /// Grids of more cells are not drawn as SVG, which would be megabytes of rectangles.
 const MOST_SVG_CELLS: usize = 20_000;
+/// Axes of logarithms over more decades are labelled at powers of ten alone.
+const MOST_DECADES: usize = 8;
 const HEADER: u32 = 54;
 const LEFT: u32 = 66;
 const RIGHT: u32 = 20;
@@ -121,12 +123,25 @@ impl Axis {
         if !self.logarithms {
             return ticks(self.low, self.high, count);
         }
+        let label = |value: f64| format!("{}", (value * 1e6).round() / 1e6);
+        let decades = (self.high - self.low).ceil() as usize;
+        if decades > MOST_DECADES {
+            let powers = (self.low.ceil() as i32..).take_while(|&power| f64::from(power) <= self.high);
+            let stride = decades.div_ceil(MOST_DECADES) as i32;
+            return powers
+                .filter(|power| power % stride == 0)
+                .map(|power| {
+                    let near = (-3..=3).contains(&power);
+                    (f64::from(power), if near { label(10f64.powi(power)) } else { format!("1e{power}") })
+                })
+                .collect();
+        }
         let steps = [1.0, 2.0, 5.0];
         let powers = self.low.floor() as i32..=self.high.ceil() as i32;
         let values = powers.flat_map(|power| steps.map(|step| step * 10f64.powi(power)));
         values
             .filter(|value| (self.low - 1e-9..=self.high + 1e-9).contains(&value.log10()))
-            .map(|value| (value.log10(), format!("{}", (value * 1e6).round() / 1e6)))
+            .map(|value| (value.log10(), label(value)))
             .collect()
     }
 

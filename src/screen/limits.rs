@@ -17,6 +17,8 @@ const MOST_CELLS: usize = 600_000;
 const AZIMUTHS: usize = 90;
 /// The worst azimuth of the worst cell is refined to this, in radians.
 const AZIMUTH_TOLERANCE: f64 = 1e-7;
+/// More than a margin falls between two of these azimuths.
+const BETWEEN_AZIMUTHS_DEG: f64 = 0.05;
 /// Pieces that an edge of the audience's outline is cut into, to find the steepest facet.
 const EDGE_PIECES: usize = 8;
 
@@ -128,13 +130,14 @@ pub fn limits(scene: &Scene, elevation: Option<&Elevation>) -> Result<Margins, E
             let [column, row] = place(at).map(|index| index as i32);
             scene.check_point((column, row), x)?;
             let sight = sight_of(scene, x);
-            let (margin_deg, azimuth) = sight.worst(&azimuths);
+            let worst = sight.worst(&azimuths);
             Ok(Cell {
                 horizontal: sight.opening([1.0, 0.0]),
                 vertical: sight.opening([0.0, 1.0]),
-                worst: sight.opening(azimuths[azimuth]),
-                margin_deg,
-                azimuth: std::f64::consts::PI * azimuth as f64 / AZIMUTHS as f64,
+                worst: sight.opening(azimuths[worst.azimuth]),
+                margin_deg: worst.eq10_deg,
+                eq11_deg: worst.eq11_deg,
+                azimuth: std::f64::consts::PI * worst.azimuth as f64 / AZIMUTHS as f64,
                 facet_pair: facet_pair(scene, x),
             })
         })
@@ -152,14 +155,24 @@ pub fn limits(scene: &Scene, elevation: Option<&Elevation>) -> Result<Margins, E
         let worst = worst(scene, place(at), point(at), azimuth(at));
         plane(openings, worst)
     };
-    let tightest = least(cells.iter().map(|cell| cell.margin_deg));
-    let refined = refine(&sight_of(scene, point(tightest)), cells[tightest].azimuth);
+    let coarsest = cells.iter().map(|cell| cell.margin_deg).fold(f64::INFINITY, f64::min);
+    let tightest: Vec<(usize, f64)> = (0..cells.len())
+        .into_par_iter()
+        .filter(|&at| cells[at].margin_deg <= coarsest + BETWEEN_AZIMUTHS_DEG)
+        .map(|at| (at, refine(&sight_of(scene, point(at)), cells[at].azimuth)))
+        .collect();
+    let of = |&(at, azimuth): &(usize, f64)| {
+        sight_of(scene, point(at)).opening([azimuth.cos(), azimuth.sin()]).eq10_deg()
+    };
+    let (tightest, refined) = tightest[least(tightest.iter().map(of))];
+    let mut any_direction = plane(&field.worst, worst(scene, place(tightest), point(tightest), refined));
+    any_direction.eq11_margin_deg = cells.iter().map(|cell| cell.eq11_deg).fold(f64::INFINITY, f64::min);
     Ok(Margins {
         points: cells.len(),
         every,
         horizontal: found(&field.horizontal, &|_| 0.0),
         vertical: found(&field.vertical, &|_| 0.5 * std::f64::consts::PI),
-        any_direction: found(&field.worst, &|at| if at == tightest { refined } else { cells[at].azimuth }),
+        any_direction,
         facet_pair_deg: cells.iter().map(|cell| cell.facet_pair).fold(1.0, f64::min).asin().to_degrees(),
         points_broken: cells.iter().filter(|cell| cell.margin_deg < 0.0).count(),
         field,
@@ -177,6 +190,7 @@ struct Cell {
     vertical: Opening,
     worst: Opening,
     margin_deg: f64,
+    eq11_deg: f64,
     azimuth: f64,
     facet_pair: f64,
 }
@@ -308,8 +322,9 @@ pub fn acuity(scene: &Scene) -> Acuity {
     }
 }
 
-/// Distance between a polyhedron and the screen's rectangle: along each line between two corners the distance
-/// is convex, and halving finds its least.
+/// Distance between a polyhedron and the screen's rectangle, which is that of two edges, of a corner and a face, or
+/// of a corner of the screen and a face. Along each line between two corners the distance is convex, and narrowing
+/// finds its least.
 fn nearest_m(polyhedron: &Polyhedron, half: DVec3) -> f64 {
     let distance = |p: DVec3| p.distance(p.clamp(-half, half));
     let corners = polyhedron.vertices_m();
@@ -327,6 +342,18 @@ fn nearest_m(polyhedron: &Polyhedron, half: DVec3) -> f64 {
                 }
             }
             nearest = nearest.min(distance(a.lerp(b, low)));
+        }
+    }
+    let faces = polyhedron.half_spaces();
+    for corner in
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| half * DVec3::new(x, y, 0.0))
+    {
+        for face in faces {
+            let away = face.normal.dot(corner) - face.offset_m;
+            let foot = corner - face.normal * away;
+            if away > 0.0 && faces.iter().all(|other| other.normal.dot(foot) <= other.offset_m + 1e-9) {
+                nearest = nearest.min(away);
+            }
         }
     }
     nearest

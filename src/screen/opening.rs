@@ -19,6 +19,15 @@ pub(super) struct Sight {
     pub projector: [f64; 2],
 }
 
+/// The smallest margins of a point over its planes: those of Eqs. 10 and 11 need not be in the same.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tightest {
+    pub eq10_deg: f64,
+    /// Place of the plane of Eq. 10 among the azimuths tried.
+    pub azimuth: usize,
+    pub eq11_deg: f64,
+}
+
 impl Sight {
     pub fn add(&mut self, outline: &[Vertex]) {
         self.corners.extend(outline.iter().map(|vertex| vertex.0));
@@ -37,14 +46,15 @@ impl Sight {
         Opening { alpha_deg: above(low), beta_deg: above(-high), gamma_deg: above(along(&self.projector)) }
     }
 
-    /// The smallest margin of Eq. 10 over all azimuths, and its azimuth in radians. Turning e round swaps alpha
-    /// with beta, and so half a turn is enough.
-    pub fn worst(&self, azimuths: &[[f64; 2]]) -> (f64, usize) {
-        let margins = azimuths.iter().map(|&e| self.opening(e).eq10_deg());
-        let mut worst = (f64::INFINITY, 0);
-        for (at, margin) in margins.enumerate() {
-            if margin < worst.0 {
-                worst = (margin, at);
+    /// The smallest margins of Eqs. 10 and 11 over all azimuths, and the place of the azimuth of the first. Turning e
+    /// round swaps alpha with beta, and so half a turn is enough.
+    pub fn worst(&self, azimuths: &[[f64; 2]]) -> Tightest {
+        let mut worst = Tightest { eq10_deg: f64::INFINITY, azimuth: 0, eq11_deg: f64::INFINITY };
+        for (azimuth, &e) in azimuths.iter().enumerate() {
+            let opening = self.opening(e);
+            worst.eq11_deg = worst.eq11_deg.min(opening.eq11_deg());
+            if opening.eq10_deg() < worst.eq10_deg {
+                (worst.eq10_deg, worst.azimuth) = (opening.eq10_deg(), azimuth);
             }
         }
         worst
