@@ -122,6 +122,34 @@ fn a_cell_of_4_mm_is_0_6_arcmin_from_23_m() {
     assert!(acuity.farthest_m > DVec3::new(1.0, 1.0, 23.9).length());
 }
 
+#[test]
+fn mirrors_that_reflect_the_same_at_every_angle_have_areas_without_fresnel() {
+    let text =
+        include_str!("../samples/theatre.toml").replace("material = \"aluminium\"", "reflectance = 0.7");
+    let scene = Scene::parse(&text, "even.toml").expect("a scene");
+    let x = scene.centre_m(450.0, 30.0, 0.0);
+    let i = (scene.projector_m - x).normalize();
+    let list = screen::directions(&scene.view(x), 50).expect("an audience").list;
+    let wanted = screen::facets(&scene, x, &list).expect("facets");
+    let area = |o: &DVec3| o.z * half_vector(i, *o).z;
+    for (weight, o) in wanted.weights.iter().zip(&list) {
+        near(weight / wanted.weights[0], area(o) / area(&list[0]), 1e-12);
+    }
+    let figures = screen::calibrate(&scene, None).expect("a mask").figures;
+    near(figures.gain_attenuation, 0.7 * std::f64::consts::PI / figures.l_max_sr, 1e-12);
+}
+
+#[test]
+fn the_nearest_place_may_be_inside_a_face() {
+    // The one face towards the screen spans all of it, its corners and edges pass far beside.
+    let corners = "[[-60.0, -40.0, 2.0], [60.0, -40.0, 2.0], [0.0, 80.0, 2.0], [0.0, 0.0, 50.0]]";
+    let text = include_str!("../samples/theatre.toml");
+    let (start, end) = (text.find("[[audience]]").expect("it"), text.find("[microgeometry]").expect("it"));
+    let text = format!("{}[[audience]]\nvertices_m = {corners}\n{}", &text[..start], &text[end..]);
+    let acuity = screen::acuity(&Scene::parse(&text, "face.toml").expect("a scene"));
+    near(acuity.nearest_m, 2.0, 1e-9);
+}
+
 /// L of Eq. 9 by a grid of directions on the unit disc, where equal areas are equal cos(theta) d(omega).
 fn counted_sr(scene: &Scene, x: DVec3) -> f64 {
     let across = 1600;
@@ -233,7 +261,7 @@ fn the_facets_of_a_cell_give_the_gain_of_the_solid_angle_formula() {
         let l = screen::projected_sr(&scene.audience, x, tilt);
         let i = (scene.projector_m - x).normalize();
         let caught = 1.0 - tilt.dot(i.truncate()) / i.z;
-        let reflectance = scene.reflector.index.reflectance(1.0);
+        let reflectance = scene.reflector.reflectance.at(1.0);
         let formula = std::f64::consts::PI * reflectance * caught / l;
         near(light.reflected() / (reflectance * caught), 1.0, 2e-3);
         // Energy: what goes in all directions is the reflected part.

@@ -95,6 +95,11 @@ fn scenes_that_are_wrong_are_refused_with_their_line() {
         ("reflector-twice", changed("material = \"aluminium\"", "material = \"aluminium\"\nn = 1.0")),
         ("reflector-half", changed("material = \"aluminium\"", "n = 1.0")),
         ("reflector-none", changed("material = \"aluminium\"", "roughness = 0.1")),
+        (
+            "reflectance-beside-a-metal",
+            changed("material = \"aluminium\"", "material = \"aluminium\"\nreflectance = 0.9"),
+        ),
+        ("reflectance-over-1", changed("material = \"aluminium\"", "reflectance = 1.5")),
         ("reflector-of-air", changed("material = \"aluminium\"", "n = 1.0\nk = 0.0")),
         ("reflector-zero", changed("material = \"aluminium\"", "n = 0.0\nk = 6.4")),
         ("reflector-nan", changed("material = \"aluminium\"", "n = nan\nk = 6.4")),

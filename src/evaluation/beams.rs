@@ -66,7 +66,7 @@ impl CellLight {
             let h = half_vector(i, o);
             let cosine = i.dot(h);
             // A facet of projected area p catches p (i . h) / h_z of the light, the flat screen p i_z.
-            let flux = weight / total * cosine / (h.z * i.z) * scene.reflector.index.reflectance(cosine);
+            let flux = weight / total * cosine / (h.z * i.z) * scene.reflector.reflectance.at(cosine);
             Beam { direction: o, normal: h, flux }
         });
         // The lattice holds `density` points on the hemisphere.

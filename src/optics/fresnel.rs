@@ -35,6 +35,25 @@ impl ComplexIndex {
     }
 }
 
+/// How much of the light a mirror reflects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reflectance {
+    /// That of a smooth metal, by its refractive index.
+    Metal(ComplexIndex),
+    /// The same at every angle.
+    Constant(f64),
+}
+
+impl Reflectance {
+    /// At an angle to the normal of this cosine.
+    pub fn at(&self, cosine: f64) -> f64 {
+        match self {
+            Reflectance::Metal(index) => index.reflectance(cosine),
+            Reflectance::Constant(value) => *value,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -33,7 +33,7 @@ impl Sight<'_> {
         Room {
             projector_m: self.scene.projector_m,
             audience: &self.scene.audience,
-            metal: Metal::new(reflector.index, reflector.roughness, reflector.diffuse),
+            metal: Metal::new(reflector.reflectance, reflector.roughness, reflector.diffuse),
             steepest: self.steepest,
             far_field: self.far_field,
         }

@@ -122,7 +122,7 @@ pub fn calibrate(scene: &Scene, elevation: Option<&Elevation>) -> Result<Calibra
         |v: &[f64]| v.iter().copied().fold(0.0, f64::max),
     );
     let centre = at_cell(scene.columns() / 2, scene.rows() / 2)?[0];
-    let reflectance = scene.reflector.index.reflectance(1.0);
+    let reflectance = scene.reflector.reflectance.at(1.0);
     let (most_need, l_mean_sr) = (most(&need), mean(&|at| l_sr[at]));
     let mean_need = l_mean_sr / mean(&|at| found[at][1]);
     let width_m = 1e-3 * scene.microgeometry.width_mm;

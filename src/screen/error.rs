@@ -53,7 +53,9 @@ pub enum Error {
         "{path}:{line}: a mirror of n = {n}, k = {k} reflects {percent:.4} % of the light; hint: a metal reflects most of it, aluminium has n = 1, k = 6.4"
     )]
     NoMirror { path: String, line: usize, n: f64, k: f64, percent: f64 },
-    #[error("{path}:{line}: the reflector is {given}; hint: give material = \"aluminium\", or both n and k")]
+    #[error(
+        "{path}:{line}: the reflector is {given}; hint: give material = \"aluminium\", or both n and k, or reflectance = 0.9 at every angle"
+    )]
     Reflector { path: String, line: usize, given: &'static str },
     #[error(
         "cells {c0} {r0} {c1} {r1} do not lie in the screen's {columns} x {rows} cells; hint: --cells C0 R0 C1 R1 with 0 <= C0 < C1 <= {columns} and 0 <= R0 < R1 <= {rows}"

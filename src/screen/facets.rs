@@ -28,7 +28,7 @@ pub(super) fn mirror(scene: &Scene, point_m: DVec3, o: DVec3) -> Mirror {
     let i = (scene.projector_m - point_m).normalize();
     let normal = half_vector(i, o);
     let cosine = i.dot(normal);
-    let reflectance = scene.reflector.index.reflectance(cosine);
+    let reflectance = scene.reflector.reflectance.at(cosine);
     let factor = match scene.microgeometry.area {
         AreaRule::Paper => 1.0 / reflectance,
         AreaRule::Exact => 1.0 / (reflectance * cosine),
@@ -125,7 +125,7 @@ mod tests {
         for ((&o, g), p) in list.iter().zip(&wanted.gradients).zip(&wanted.weights) {
             let normal = DVec3::new(-g[0], -g[1], 1.0).normalize();
             // Light that the mirror catches and sends on, over the base's projected area towards o.
-            let caught = p / normal.z * i.dot(normal) * scene.reflector.index.reflectance(i.dot(normal));
+            let caught = p / normal.z * i.dot(normal) * scene.reflector.reflectance.at(i.dot(normal));
             let seen = o.z - m.dot(o.truncate());
             assert!((caught / seen - 1.0).abs() < 1e-12, "{caught} {seen}");
         }

@@ -3,7 +3,7 @@ use std::path::Path;
 use glam::DVec3;
 use serde::Deserialize;
 
-use crate::optics::ComplexIndex;
+use crate::optics::{ComplexIndex, Reflectance};
 use crate::settings::{Numbers, Source};
 
 use super::audience::{Polyhedron, View};
@@ -76,7 +76,7 @@ pub enum ElevationMethod {
 /// What the mirrors are made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflector {
-    pub index: ComplexIndex,
+    pub reflectance: Reflectance,
     /// Width of the microfacet lobe (GGX alpha); None is a mirror.
     pub roughness: Option<f64>,
     /// Part of the reflected light that leaves as from a matte surface.
@@ -139,6 +139,7 @@ struct ReflectorTable {
     material: Option<String>,
     n: Option<f64>,
     k: Option<f64>,
+    reflectance: Option<f64>,
     roughness: Option<f64>,
     diffuse: Option<f64>,
 }
@@ -276,10 +277,15 @@ fn reflector(source: &Source, table: &ReflectorTable) -> Result<Reflector, Error
     let refuse = |given| {
         Err(Error::Reflector { path: source.path().into(), line: source.line_of("reflector"), given })
     };
-    let index = match (&table.material, table.n, table.k) {
-        (Some(name), None, None) => ComplexIndex::named(name)
-            .ok_or_else(|| source.unknown_value("reflector.material", name, &ComplexIndex::names()))?,
-        (None, Some(n), Some(k)) => {
+    let reflectance = match (&table.material, table.n, table.k, table.reflectance) {
+        (Some(name), None, None, None) => Reflectance::Metal(
+            ComplexIndex::named(name)
+                .ok_or_else(|| source.unknown_value("reflector.material", name, &ComplexIndex::names()))?,
+        ),
+        (None, None, None, Some(value)) => {
+            Reflectance::Constant(source.within("reflector.reflectance", value, LEAST_REFLECTANCE, 1.0)?)
+        }
+        (None, Some(n), Some(k), None) => {
             let n = source.within("reflector.n", n, 0.01, 100.0)?;
             let k = source.within("reflector.k", k, 0.0, 100.0)?;
             let index = ComplexIndex { n, k };
@@ -288,18 +294,20 @@ fn reflector(source: &Source, table: &ReflectorTable) -> Result<Reflector, Error
                 let (path, line) = (source.path().into(), source.line_of("reflector.n"));
                 return Err(Error::NoMirror { path, line, n, k, percent: 100.0 * reflectance });
             }
-            index
+            Reflectance::Metal(index)
         }
-        (Some(_), _, _) => return refuse("given twice, by its material and by n or k"),
-        (None, None, None) => return refuse("not given"),
-        (None, _, _) => return refuse("given by only one of n and k"),
+        (Some(_), _, _, _) | (_, _, _, Some(_)) => {
+            return refuse("given twice, by two of its material, n and k, and reflectance");
+        }
+        (None, None, None, None) => return refuse("not given"),
+        (None, _, _, None) => return refuse("given by only one of n and k"),
     };
     let roughness = match table.roughness {
         Some(value) => Some(source.within("reflector.roughness", value, 0.0, 1.0)?),
         None => None,
     };
     let diffuse = source.within("reflector.diffuse", table.diffuse.unwrap_or(0.0), 0.0, 1.0)?;
-    Ok(Reflector { index, roughness, diffuse })
+    Ok(Reflector { reflectance, roughness, diffuse })
 }
 
 fn audience(source: &Source, tables: &[AudienceTable], size_m: [f64; 2]) -> Result<Vec<Polyhedron>, Error> {

@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use crate::optics::{ComplexIndex, Lobe};
+use crate::optics::{ComplexIndex, Lobe, Reflectance};
 
 /// Lobes narrower than this are mirrors.
 const MIRROR: f64 = 1e-4;
@@ -12,7 +12,7 @@ const MIRROR: f64 = 1e-4;
 /// is reciprocal. Of the microfacets' light the part that meets another of them is not followed.
 #[derive(Clone, Copy, Debug)]
 pub struct Metal {
-    index: ComplexIndex,
+    reflectance: Reflectance,
     lobe: Option<Lobe>,
     diffuse: f64,
 }
@@ -30,8 +30,8 @@ pub struct Scattered {
 
 impl Metal {
     /// `roughness` is the lobe's alpha, None a mirror; `diffuse` the matte part of what is reflected.
-    pub fn new(index: ComplexIndex, roughness: Option<f64>, diffuse: f64) -> Metal {
-        Metal { index, lobe: roughness.filter(|alpha| *alpha > MIRROR).map(Lobe::new), diffuse }
+    pub fn new(reflectance: Reflectance, roughness: Option<f64>, diffuse: f64) -> Metal {
+        Metal { reflectance, lobe: roughness.filter(|alpha| *alpha > MIRROR).map(Lobe::new), diffuse }
     }
 
     /// The same metal as a perfect mirror.
@@ -39,8 +39,12 @@ impl Metal {
         Metal { lobe: None, diffuse: 0.0, ..*self }
     }
 
-    pub(super) fn index(&self) -> ComplexIndex {
-        self.index
+    /// The reflectance as a + b F, with F that of a refractive index n + i k: [n, k], then [a, b].
+    pub(super) fn by_index(&self) -> [[f64; 2]; 2] {
+        match self.reflectance {
+            Reflectance::Metal(ComplexIndex { n, k }) => [[n, k], [0.0, 1.0]],
+            Reflectance::Constant(value) => [[1.0, 1.0], [value, 0.0]],
+        }
     }
 
     /// Whether light from one direction leaves in one direction.
@@ -53,7 +57,7 @@ impl Metal {
     #[inline]
     pub fn scatter(&self, i: DVec3, n: DVec3, cosine: f64, draw: impl FnOnce() -> [f64; 3]) -> Scattered {
         let mirrored = |m: DVec3, c: f64, escapes: f64| {
-            let reflected = self.index.reflectance(c);
+            let reflected = self.reflectance.at(c);
             Scattered {
                 out: 2.0 * c * m - i,
                 goes_on: reflected * escapes,
@@ -70,7 +74,7 @@ impl Metal {
             // Even over the disc is cosine-weighted over the hemisphere (Malley).
             let (sin, cos) = (2.0 * std::f64::consts::PI * u).sin_cos();
             let out = v.sqrt() * (cos * x + sin * y) + (1.0 - v).sqrt() * n;
-            let reflected = self.index.reflectance(1.0);
+            let reflected = self.reflectance.at(1.0);
             return Scattered { out, goes_on: reflected, absorbed: 1.0 - reflected, masked: 0.0 };
         }
         let Some(lobe) = self.lobe else { return mirrored(n, cosine, 1.0) };
@@ -124,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_flat_mirror_gives_one_direction() {
-        let metal = Metal::new(ALUMINIUM, None, 0.0);
+        let metal = Metal::new(Reflectance::Metal(ALUMINIUM), None, 0.0);
         let i = DVec3::new(0.3, -0.2, 0.9).normalize();
         let way = metal.scatter(i, DVec3::Z, i.z, || draw(3, 4, 0));
         assert!((way.out - DVec3::new(-i.x, -i.y, i.z)).length() < 1e-15);
@@ -133,7 +137,7 @@ mod tests {
 
     #[test]
     fn matte_metal_has_the_gain_of_its_reflectance() {
-        let metal = Metal::new(ALUMINIUM, None, 1.0);
+        let metal = Metal::new(Reflectance::Metal(ALUMINIUM), None, 1.0);
         let axis = DVec3::new(0.4, 0.1, 0.9).normalize();
         let [.., inside] = means(&metal, DVec3::new(0.1, 0.5, 0.8).normalize(), axis);
         // The projected solid angle of a cone is pi sin^2 times the axis' own cosine.
@@ -143,7 +147,7 @@ mod tests {
 
     #[test]
     fn rough_metal_sends_as_much_one_way_as_back() {
-        let metal = Metal::new(ALUMINIUM, Some(0.3), 0.1);
+        let metal = Metal::new(Reflectance::Metal(ALUMINIUM), Some(0.3), 0.1);
         let (a, b) = (DVec3::new(0.55, 0.1, 0.83).normalize(), DVec3::new(-0.3, 0.2, 0.93).normalize());
         // Flux into a small cone over its projected solid angle is the radiance per irradiance.
         let [.., there] = means(&metal, a, b);

@@ -69,7 +69,7 @@ impl Chunk {
             ],
             step_mm,
             projector: stage.projector_m,
-            index: [stage.metal.index().n, stage.metal.index().k],
+            metal: stage.metal.by_index(),
             rotation: stage.rotation,
         };
         let rows = [line(r, c), line(r, c - 1), line(r, c + 1), line(r - 1, c), line(r + 1, c)];
@@ -82,7 +82,7 @@ struct About {
     place: [f64; 3],
     step_mm: f64,
     projector: DVec3,
-    index: [f64; 2],
+    metal: [[f64; 2]; 2],
     rotation: DMat3,
 }
 
@@ -121,7 +121,7 @@ fn work(chunk: &mut Chunk, rows: &[&[f32]; 5], about: &About, outlines: &[&[[DVe
     let [here, left, right, below, above] = rows.map(|row| &row[..count]);
     let Chunk { taken, reflected, met, bin, done, clear2, out: [ox, oy, oz], turn: [qx, qy, qz] } = chunk;
     let per_mm = 0.5 / about.step_mm;
-    let [n, k] = about.index;
+    let [[n, k], [constant, of_index]] = about.metal;
     let (nk, nk4) = (n * n - k * k, 4.0 * n * n * k * k);
     let half = 0.5 * ROOM_BINS as f64;
     let turned = about.rotation;
@@ -147,7 +147,8 @@ fn work(chunk: &mut Chunk, rows: &[&[f32]; 5], about: &About, outlines: &[&[[DVe
         let ac = 2.0 * (0.5 * (a2b2 + t)).sqrt() * cos;
         // s (1 + (u - v) / (u + v)) / 2 with s = (a^2 + b^2 + cos^2 - ac) / (a^2 + b^2 + cos^2 + ac).
         let (u, v) = (cos2 * a2b2 + sin2 * sin2, ac * sin2);
-        let reflectance = (a2b2 + cos2 - ac) * u / ((a2b2 + cos2 + ac) * (u + v));
+        let fresnel = (a2b2 + cos2 - ac) * u / ((a2b2 + cos2 + ac) * (u + v));
+        let reflectance = constant + of_index * fresnel;
         // The mirrored ray, |N|^2 |i| long.
         let (x, y, z) = (-2.0 * dot * zx - n2 * ix, -2.0 * dot * zy - n2 * iy, 2.0 * dot - n2 * iz);
         let (flat2, clear) = (x * x + y * y, clear2[at]);

@@ -333,7 +333,7 @@ mod tests {
 
     use super::super::Metal;
     use super::*;
-    use crate::optics::ComplexIndex;
+    use crate::optics::{ComplexIndex, Reflectance};
     use crate::screen::Polyhedron;
 
     const ALUMINIUM: ComplexIndex = ComplexIndex { n: 1.0, k: 6.4 };
@@ -384,13 +384,16 @@ mod tests {
         let tilted = heights(window, |x, _| 0.2 * x);
         let n = DVec3::new(-0.2, 0.0, 1.0).normalize();
         let out = 2.0 * n.z * n - DVec3::Z;
-        let metal = Metal::new(ALUMINIUM, None, 0.0);
+        let metal = Metal::new(Reflectance::Metal(ALUMINIUM), None, 0.0);
         let tally = light(&tilted, metal, &[body(3.0 * out, 0.01)]);
         let shares = tally.shares().expect("light fell");
         let reflected = ALUMINIUM.reflectance(n.z);
         assert!((shares.on_audience - reflected).abs() < 1e-6, "{shares:?}");
         assert!((sum(shares) - 1.0).abs() < 1e-12);
         assert_eq!(tally.standard_error(), None);
+        let constant = Metal::new(Reflectance::Constant(0.7), None, 0.0);
+        let even = light(&tilted, constant, &[body(3.0 * out, 0.01)]).shares().expect("light fell");
+        assert!((even.on_audience - 0.7).abs() < 1e-6 && (even.absorbed - 0.3).abs() < 1e-6, "{even:?}");
         let beside = light(&tilted, metal, &[body(3.0 * out + DVec3::new(0.05, 0.0, 0.0), 0.01)]);
         assert!(beside.shares().expect("light fell").on_audience == 0.0);
     }
@@ -399,7 +402,7 @@ mod tests {
     fn a_matte_surface_has_gain_one() {
         let window = Window { column: 0, row: 0, columns: 502, rows: 502 };
         // A perfect reflector: n = 0.01, k = 100 reflects 0.99999.
-        let metal = Metal::new(ComplexIndex { n: 0.01, k: 100.0 }, None, 1.0);
+        let metal = Metal::new(Reflectance::Metal(ComplexIndex { n: 0.01, k: 100.0 }), None, 1.0);
         let audience = [body(DVec3::new(0.8, 0.3, 3.0), 0.9)];
         let tally = light(&heights(window, |_, _| 0.0), metal, &audience);
         let view = View::from_points(&[DVec3::ZERO], &|p, o| audience[0].hit(p, o));
@@ -417,14 +420,14 @@ mod tests {
         let grooves = heights(window, |x, _| ((x / 0.4).fract() - 0.5).abs() * 0.4);
         let audience = [body(DVec3::new(0.0, 0.0, 3.0), 0.2)];
         for metal in [
-            Metal::new(ALUMINIUM, None, 0.0),
-            Metal::new(ALUMINIUM, Some(0.2), 0.05),
-            Metal::new(ALUMINIUM, Some(0.7), 0.0),
+            Metal::new(Reflectance::Metal(ALUMINIUM), None, 0.0),
+            Metal::new(Reflectance::Metal(ALUMINIUM), Some(0.2), 0.05),
+            Metal::new(Reflectance::Metal(ALUMINIUM), Some(0.7), 0.0),
         ] {
             let shares = light(&grooves, metal, &audience).shares().expect("light fell");
             assert!((sum(shares) - 1.0).abs() < 1e-9, "{shares:?}");
         }
-        let mirror = light(&grooves, Metal::new(ALUMINIUM, None, 0.0), &audience);
+        let mirror = light(&grooves, Metal::new(Reflectance::Metal(ALUMINIUM), None, 0.0), &audience);
         let shares = mirror.shares().expect("light fell");
         // Two reflections at 45 degrees bring it straight back, but where a ridge or a bottom lies between samples.
         let twice = ALUMINIUM.reflectance(0.5f64.sqrt()).powi(2);
@@ -440,7 +443,7 @@ mod tests {
         let audience = [body(DVec3::new(0.3, 0.1, 3.0), 0.4), body(DVec3::new(-1.0, 0.2, 3.5), 0.5)];
         let rotation = DMat3::from_rotation_x(0.1) * DMat3::from_rotation_y(-0.15);
         let pose = Pose { origin_m: DVec3::new(0.1, -0.2, 0.05), rotation };
-        let metal = Metal::new(ALUMINIUM, None, 0.0);
+        let metal = Metal::new(Reflectance::Metal(ALUMINIUM), None, 0.0);
         let projector_m = DVec3::new(0.2, 0.1, 3.0);
         let room = Room { projector_m, audience: &audience, metal, steepest: 0.3, far_field: None };
         let inner = Window { column: -6, row: 4, columns: 328, rows: 68 };
@@ -476,7 +479,7 @@ mod tests {
         let bumps = heights(window, |x, y| 0.01 * (20.0 * x).sin() * (15.0 * y).cos());
         let audience = [body(DVec3::new(0.0, 0.0, 3.0), 0.3)];
         let pose = Pose { origin_m: DVec3::ZERO, rotation: DMat3::IDENTITY };
-        let metal = Metal::new(ALUMINIUM, None, 0.0);
+        let metal = Metal::new(Reflectance::Metal(ALUMINIUM), None, 0.0);
         let projector_m = DVec3::new(0.0, 0.0, 5.0);
         let room = Room { projector_m, audience: &audience, metal, steepest: 0.3, far_field: None };
         let (mut tally, mut map) = (LightTally::default(), Pixels::new(120, 90, 50));
