@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use screenmill::catalogue::{self, Kind};
 use screenmill::machine::{
-    Blanks, Bounds, Error, Fixture, Guard, Library, Machine, Quantum, Setup, Stock, ZNeed, fits_z, floor_mm,
-    split, split_to_fit,
+    Blanks, Bounds, Error, Fixture, Guard, Library, Machine, Quantum, Setup, Stock, Tile, ZNeed, fits_z,
+    floor_mm, split, split_to_fit,
 };
 
 fn stock(blanks: Blanks) -> Stock {
@@ -157,8 +157,26 @@ fn what_is_too_deep_in_one_piece_is_cut_in_smaller_ones() {
         Ok::<_, Error>(fits_z(&tile.name, need(tile.width_mm), &machine).err())
     })
     .expect("narrower tiles are less deep");
-    assert_eq!(tiles.len(), 4);
+    // Up to 186.5 mm wide: three do, no fewer.
+    assert_eq!(tiles.len(), 3);
     assert!(tiles.iter().all(|tile| fits_z(&tile.name, need(tile.width_mm), &machine).is_ok()));
+    // A blank that is too wide as it lies, along Y: only Y is divided further, by one.
+    let (size, room_mm) = ([400.0, 400.0], 103.0);
+    let blank = |tile: &Tile| Error::Blank {
+        tile: tile.name.clone(),
+        length_mm: tile.height_mm + 2.0,
+        axis: "Y",
+        room_mm,
+        machine: machine.name.clone(),
+        fixture: fixture.name.clone(),
+    };
+    let first = split(size, cell, 0.5, &stock, &machine, &fixture).expect("fits");
+    let tiles = split_to_fit(size, cell, 0.5, 20.0, &stock, &machine, &fixture, |tile| {
+        Ok::<_, Error>((tile.height_mm + 2.0 > room_mm).then(|| blank(tile)))
+    })
+    .expect("shorter tiles fit");
+    let columns = |tiles: &[Tile]| tiles.iter().filter(|tile| tile.row == 0).count();
+    assert!(columns(&first) == columns(&tiles) && tiles.len() == 4 * columns(&tiles), "{}", tiles.len());
     let deep = ZNeed { depth_mm: 51.9, top_allowance_mm: 0.2, clearance_mm: 5.0 };
     let refusal = split_to_fit([400.0, 8.0], cell, 0.5, 20.0, &stock, &machine, &fixture, |tile| {
         Ok::<_, Error>(fits_z(&tile.name, deep, &machine).err())

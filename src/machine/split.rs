@@ -105,15 +105,20 @@ pub fn split_to_fit<E: From<Error>>(
             }
         }
         let Some(found) = found else { return Ok(tiles) };
-        let refusal = first_refusal.take().unwrap_or(found);
         let length = |axis: usize| size_mm[axis] / counts[axis] as f64;
-        let axis = if length(0) >= length(1) { 0 } else { 1 };
+        // Too wide a blank asks for shorter tiles along that side, too much Z along the longer one.
+        let axis = match &found {
+            Error::Blank { axis, .. } => usize::from(*axis == "Y"),
+            _ => usize::from(length(0) < length(1)),
+        };
+        let refusal = first_refusal.take().unwrap_or(found);
         let shortest = smallest_mm.max(quantum.length_mm());
         if length(axis) < 2.0 * shortest {
             return Err(refusal.into());
         }
         first_refusal = Some(refusal);
-        counts[axis] += counts[axis];
+        // A setup more than needed costs an operator more than a division that is tried in vain.
+        counts[axis] += counts[axis].div_ceil(4);
     }
 }
 

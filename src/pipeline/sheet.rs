@@ -350,6 +350,9 @@ fn limits(job: &Job, shop: &Shop, result: &TileResult) -> Vec<String> {
         let Shape::Ball { diameter_mm } = tool.shape else { continue };
         let radius = 0.5 * diameter_mm;
         let across = if operation.direction_deg.rem_euclid(180.0) == 0.0 { steepest[1] } else { steepest[0] };
+        // Walls that levelling leans are no mirrors.
+        let (across, place) =
+            if across > 1.0 { (1.0, "faces of 45 degrees") } else { (across, "the steepest face") };
         let scallop_mm = match (operation.stepover_mm, operation.scallop_mm) {
             // w = stepover / cos of the slope across; h = R - sqrt(R^2 - (w/2)^2).
             (Some(stepover_mm), _) => {
@@ -359,7 +362,7 @@ fn limits(job: &Job, shop: &Shop, result: &TileResult) -> Vec<String> {
             (None, scallop_mm) => scallop_mm.unwrap_or_default(),
         };
         limits.push(format!(
-            "Passes of {} leave scallops of up to {:.2} um on the steepest face.",
+            "Passes of {} leave scallops of up to {:.2} um on {place}.",
             tool.name,
             scallop_mm * 1e3
         ));
