@@ -11,16 +11,17 @@ use super::rescue::{shift, try_candidates};
 use super::shop::Shop;
 use super::tabs::{self, Slot};
 use super::underside::{self, Thin};
-use super::{Error, report};
+use super::{Error, light, report};
 use crate::compensation::Profile;
 use crate::cutter::Shape;
 use crate::fidelity::light::LightTally;
-use crate::fidelity::{self, Tally};
+use crate::fidelity::{self, Pixels, Tally};
 use crate::job::{Blanks, Face, Job, Kind, Level};
 use crate::machine::{self, Setup};
 use crate::progress::Progress;
 use crate::report::picture::{self, Caption};
-use crate::report::{Report, light_picture};
+use crate::report::{Finding, Report, light_picture};
+use crate::screen::Scene;
 use crate::verify::{self, Blank, BodyHit, Judged, LateralRapid, ProgramCut};
 
 /// Pieces of a part are not made shorter than this to save travel in Z.
@@ -60,6 +61,9 @@ pub struct TileResult {
     pub map_factor: usize,
     /// Names of the cutters that were tried on the cavities, largest first.
     pub candidates: Vec<String>,
+    /// The part of each cell's light that reaches the audience, of the design and of the cut.
+    pub on_audience: Option<[Vec<f64>; 2]>,
+    pub findings: Vec<Finding>,
 }
 
 /// Cuts a job under `staging`. `folder` is the job's own, where it looks for its files.
@@ -74,7 +78,13 @@ pub fn mill(job: &Job, folder: &Path, staging: &Path, progress: &dyn Progress) -
         for dialect in &shop.dialects {
             posts.push(plan::programs(job, &shop, &tile, dialect, staging, progress)?);
         }
-        results.push(judged(job, &shop, &part, tile, posts, staging, progress)?);
+        let mut result = judged(job, &shop, &part, tile, posts, staging, progress)?;
+        result.findings = report::of_tile(job, &shop, &mut result, staging)?;
+        // A part has any number of tiles: what is as large as a tile goes with it.
+        for program in result.posts.iter_mut().flat_map(|post| &mut post.programs) {
+            program.reading.motions = Vec::new();
+        }
+        results.push(result);
     }
     report::finish(job, &shop, &part, results, staging)
 }
@@ -227,7 +237,15 @@ fn judged(
     progress.begin("maps", 1);
     let at = &tile.setup.tile;
     let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;
-    draw_means(staging, job, &tile, &verdict, lattice.step_mm)?;
+    let mut on_audience = None;
+    if let Some(pictures) = verdict.pictures.take() {
+        draw_means(staging, job, &tile, &verdict, &pictures, lattice.step_mm)?;
+        let of_cells = |scene: &Scene, maps: &[Pixels; 2]| {
+            maps.each_ref().map(|map| light::of_cells(scene, map, job.part.step_mm))
+        };
+        on_audience =
+            part.scene.as_ref().zip(pictures.light.as_ref()).map(|(scene, maps)| of_cells(scene, maps));
+    }
     progress.begin("shanks", 1);
     let mut motions = Vec::new();
     let mut slots = Vec::new();
@@ -251,7 +269,18 @@ fn judged(
     }
     drop(judged);
     drop(tops);
-    Ok(TileResult { tile, posts, verdict, motions, slots, maps, map_factor, candidates: names })
+    Ok(TileResult {
+        tile,
+        posts,
+        verdict,
+        motions,
+        slots,
+        maps,
+        map_factor,
+        candidates: names,
+        on_audience,
+        findings: Vec::new(),
+    })
 }
 
 /// Pictures of the normals' errors and of lost light.
@@ -260,6 +289,7 @@ fn draw_means(
     job: &Job,
     tile: &TileSetup,
     verdict: &Verdict,
+    Pictures { normals, light }: &Pictures,
     step_mm: f64,
 ) -> Result<(), Error> {
     let at = &tile.setup.tile;
@@ -269,7 +299,6 @@ fn draw_means(
         origin_mm: [at.x_mm, at.y_mm],
         notes,
     };
-    let Pictures { normals, light } = &verdict.pictures;
     let figures = verdict.tallies[0].figures();
     let degrees = |value: Option<f64>| value.map_or("-".into(), |deg| format!("{deg:.2}"));
     let note = format!(

@@ -57,7 +57,8 @@ pub struct Verdict {
     pub light_machined: Vec<LightTally>,
     /// Of the first post's cut, polished by the model.
     pub light_polished: LightTally,
-    pub pictures: Pictures,
+    /// Until they are drawn.
+    pub pictures: Option<Pictures>,
 }
 
 /// Means over pixels of a tile, as the first post cuts it.
@@ -167,7 +168,7 @@ pub fn judge(
         light_designed,
         light_machined,
         light_polished,
-        pictures,
+        pictures: Some(pictures),
     })
 }
 

@@ -119,11 +119,14 @@ pub fn summary(designed: &LightTally, machined: &LightTally, view: &View) -> Opt
     })
 }
 
-/// 1 - standard deviation / mean, over the screen's cells, of the part of their light that reaches the audience: from maps
-/// of tiles, as samples of `step_mm`.
-pub fn over_screen<'a>(scene: &Scene, maps: impl Iterator<Item = &'a Pixels>, step_mm: f64) -> Option<f64> {
-    let samples = (scene.microgeometry.width_mm / step_mm).round() as usize;
-    let shares: Vec<f64> = maps.flat_map(|map| map.means_of_squares(samples)).collect();
+/// The part of its light that reaches the audience, for each of a tile's cells, from its map as samples of `step_mm`.
+pub fn of_cells(scene: &Scene, map: &Pixels, step_mm: f64) -> Vec<f64> {
+    map.means_of_squares((scene.microgeometry.width_mm / step_mm).round() as usize)
+}
+
+/// 1 - standard deviation / mean, over the screen's cells, of those parts.
+pub fn over_screen(shares: impl Iterator<Item = f64>) -> Option<f64> {
+    let shares: Vec<f64> = shares.collect();
     let count = shares.len() as f64;
     let mean = shares.iter().sum::<f64>() / count;
     let variance = shares.iter().map(|share| (share - mean).powi(2)).sum::<f64>() / count;

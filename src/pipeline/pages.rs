@@ -63,7 +63,7 @@ fn page<'a>(
                 map_file: map_file.clone(),
             });
         }
-        for (name, made) in [("normals", true), ("light", result.verdict.pictures.light.is_some())] {
+        for (name, made) in [("normals", true), ("light", result.on_audience.is_some())] {
             let file = format!("maps/{tile}-{name}.png");
             if made {
                 pictures.push(Picture {

@@ -54,8 +54,11 @@ pub struct Program {
     pub face: Face,
     /// None where the operation is one program.
     pub section: Option<Section>,
+    /// Its motions are kept until the tile is judged.
     pub reading: Reading,
     pub extent: Extent,
+    /// The lowest place that it comes to.
+    pub lowest_mm: Option<[f64; 3]>,
     pub timing: Timing,
     /// What rounding does to the mirrors; known of a finish that leaves no stock.
     pub tilt: Option<toolpath::Tilt>,

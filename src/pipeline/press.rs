@@ -90,12 +90,15 @@ impl Press<'_> {
         let reading = Reading::from(&mut BufReader::with_capacity(1 << 20, open), &options)
             .map_err(|source| Error::ReadBack { path: file.clone(), source })?;
         let extent = reading.extent();
+        let known = reading.motions.iter().filter(|motion| motion.known()).map(|motion| motion.to_mm);
+        let lowest_mm = known.reduce(|lowest, place| if place[2] < lowest[2] { place } else { lowest });
         let timing = verify::time(&reading, &(&self.shop.machine).into());
         post::stamp_time(&mut out, &written, self.dialect, timing.total_s)?;
         out.flush().map_err(output)?;
         let tilt = program.path.tilt;
         let face = self.job.operations[operation].face;
-        Ok(Program { file, operation, face, section: program.section, reading, extent, timing, tilt })
+        let section = program.section;
+        Ok(Program { file, operation, face, section, reading, extent, lowest_mm, timing, tilt })
     }
 
     /// `programs/<tile>-<nn>-<operation>-<tool>.<ext>`, with `-s<nn>` for a section, in a folder for each

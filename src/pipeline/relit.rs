@@ -122,7 +122,7 @@ pub fn relit(case: &Relit, progress: &dyn Progress) -> Result<Lit, Error> {
     let middle_m = sight.pose.point_m(DVec3::new(0.5 * lattice.width_mm, 0.5 * lattice.height_mm, 0.0));
     let view = light::view(&scene, &light::points(&sight.pose, &lattice));
     let mut light = light::summary(&tallies[0], &tallies[1], &view).ok_or(Error::NoLightFalls)?;
-    let over_screen = |map| light::over_screen(&scene, std::iter::once(map), lattice.step_mm);
+    let over_screen = |map| light::over_screen(light::of_cells(&scene, map, lattice.step_mm).into_iter());
     light.screen_uniformity_designed = over_screen(&maps[0]);
     light.screen_uniformity_machined = over_screen(&maps[1]);
     light.polished = polish_mm.and_then(|removal_mm| light::polished(&after_polish, removal_mm, &view));

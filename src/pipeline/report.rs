@@ -41,7 +41,7 @@ pub fn finish(
         report.finding(found);
     }
     for result in &mut results {
-        for found in of_tile(job, shop, result, staging)? {
+        for found in std::mem::take(&mut result.findings) {
             report.finding(found);
         }
         report.tiles.push(tile(job, shop, result));
@@ -146,7 +146,12 @@ fn of_a_die(seam: Option<Seam>) -> &'static str {
 }
 
 /// What a tile shows, with the programs that must not be run moved to `rejected/`.
-fn of_tile(job: &Job, shop: &Shop, result: &mut TileResult, staging: &Path) -> Result<Vec<Finding>, Error> {
+pub(super) fn of_tile(
+    job: &Job,
+    shop: &Shop,
+    result: &mut TileResult,
+    staging: &Path,
+) -> Result<Vec<Finding>, Error> {
     let name = result.tile.setup.tile.name.clone();
     let gouge_limit_mm = job.limits.gouge_or_default_mm();
     let mut found = Vec::new();
@@ -279,8 +284,8 @@ fn of_light(
     let mut light = light::summary(&designed, &machined, &view);
     if let Some(light) = &mut light {
         let over_screen = |which: usize| {
-            let maps = results.iter().filter_map(|result| result.verdict.pictures.light.as_ref());
-            light::over_screen(scene, maps.map(|maps| &maps[which]), job.part.step_mm)
+            let cells = results.iter().filter_map(|result| result.on_audience.as_ref());
+            light::over_screen(cells.flat_map(|shares| shares[which].iter().copied()))
         };
         light.screen_uniformity_designed = over_screen(0);
         light.screen_uniformity_machined = over_screen(1);

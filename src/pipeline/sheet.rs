@@ -296,19 +296,15 @@ fn checks(job: &Job, shop: &Shop, result: &TileResult) -> Vec<String> {
             "Run {} first: spindle off, {} mm above the blank, round the tile and then round all that is cut. Watch the clamps and the corners.",
             program.file.display(),
             // It only rises from the height that it runs at.
-            program.reading.motions.iter().filter(|motion| !motion.rapid() && motion.known()).map(|motion| motion.to_mm[2]).fold(f64::INFINITY, f64::min) + tile.z_zero_mm - tile.allowance_mm
+            program.extent.low_mm[2] + tile.z_zero_mm - tile.allowance_mm
         ),
         None => "Run the first program with Z raised by its depth, spindle off, and watch the corners.".into(),
     });
     let kind = |program: &&Program| job.operations[program.operation].kind == Kind::Rough;
-    if let Some(rough) = result.posts[0].programs.iter().find(kind) {
+    if let Some(rough) = result.posts[0].programs.iter().find(kind)
+        && let Some(lowest) = rough.lowest_mm
+    {
         let operation = &job.operations[rough.operation];
-        let mut lowest = [0.0, 0.0, f64::INFINITY];
-        for motion in rough.reading.motions.iter().filter(|motion| motion.known()) {
-            if motion.to_mm[2] < lowest[2] {
-                lowest = motion.to_mm;
-            }
-        }
         let below_mm = tile.allowance_mm - tile.z_zero_mm - lowest[2];
         checks.push(format!(
             "After {}: at X {:.2} Y {:.2} the floor lies {below_mm:.2} mm below the blank's top. Measure it; if it is deeper by {:.2} mm or more, stop: {}.",
