@@ -65,7 +65,7 @@ pub(super) fn resumed(whole: &Whole) -> Result<Vec<u8>, Error> {
             out.extend(style.line(&format!("resumed at pass {at}"), whole.ending()));
         }
         if !super::passes::marked(line) {
-            out.extend_from_slice(line);
+            out.extend(if index < header { of_the_whole(line) } else { line.to_vec() });
         }
     }
     let mut push = |text: &str| {
@@ -113,6 +113,22 @@ pub(super) fn resumed(whole: &Whole) -> Result<Vec<u8>, Error> {
         out.extend_from_slice(line);
     }
     Ok(out)
+}
+
+/// A line of the header whose figure is no longer that of the text: it is said to be of the whole, in no more letters.
+fn of_the_whole(line: &[u8]) -> Vec<u8> {
+    let mut line = line.to_vec();
+    for (said, instead) in
+        [("sha256 of all lines below", "sha256 of the whole body"), ("estimated time", "time in whole")]
+    {
+        let found = line.windows(said.len()).position(|part| part.eq_ignore_ascii_case(said.as_bytes()));
+        if let Some(at) = found {
+            let capitals = line[at].is_ascii_uppercase();
+            let text = if capitals { instead.to_ascii_uppercase() } else { instead.into() };
+            line.splice(at..at + said.len(), text.bytes());
+        }
+    }
+    line
 }
 
 impl State {
