@@ -20,6 +20,12 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Ctrl-C and a polite kill end the work at the next safe place, and after two seconds wherever it is;
 /// unfinished outputs are removed either way.
 pub fn listen_for_interrupt() -> Result<(), ctrlc::Error> {
+    // A file that grows past `ulimit -f` is a disk that is full, told and cleaned up, and no reason to be killed.
+    #[cfg(target_os = "linux")]
+    // SAFETY: nothing else in the program handles this signal, and ignoring it runs no code.
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
     ctrlc::set_handler(|| {
         INTERRUPTED.store(true, Ordering::SeqCst);
         std::thread::sleep(PATIENCE);
