@@ -143,6 +143,11 @@ fn a_refusal_is_one_message_and_leaves_nothing_behind() {
     design(&[&sample("theatre"), "--out", out, "--stl", out])
         .code(2)
         .stderr(predicate::str::contains("a.npz is asked for twice"));
+    for threads in ["0", "1000000", "-1", "two"] {
+        design(&[&sample("theatre"), "--out", out, "--threads", threads])
+            .code(2)
+            .stderr(predicate::str::contains("--threads"));
+    }
     assert!(is_empty(folder.path()));
 }
 

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 use screenmill::evaluation::{self, CellLight};
 use screenmill::optics::half_vector;
+use screenmill::progress::Silent;
 use screenmill::screen::{self, Scene};
 
 fn sample(name: &str) -> Scene {
@@ -120,6 +121,22 @@ fn a_cell_of_4_mm_is_0_6_arcmin_from_23_m() {
     near(acuity.nearest_m, 22.0, 1e-9);
     near(acuity.one_arcmin_m, 13.751, 1e-3);
     assert!(acuity.farthest_m > DVec3::new(1.0, 1.0, 23.9).length());
+}
+
+#[test]
+fn exact_areas_make_the_elevated_screen_even_where_the_papers_do_not() {
+    let deviations = |rule: &str| -> Vec<f64> {
+        let text = include_str!("../samples/theatre.toml")
+            .replace("width_mm = 4.0", "width_mm = 50.0")
+            .replace("area = \"paper\"", &format!("area = \"{rule}\""));
+        let scene = Scene::parse(&text, "areas.toml").expect("a scene");
+        let found = evaluation::evaluate(&scene, &Silent).expect("a screen").expect("not interrupted");
+        found.views.iter().map(|view| view.deviation).collect()
+    };
+    let (paper, exact) = (deviations("paper"), deviations("exact"));
+    for (paper, exact) in paper.iter().zip(&exact) {
+        assert!(*exact < 0.02 && *paper > 2.0 * exact, "{paper} {exact}");
+    }
 }
 
 #[test]

@@ -48,7 +48,7 @@ pub struct Common {
     #[arg(long, global = true)]
     pub quiet: bool,
     /// Worker threads; all cores if left out
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, global = true, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Log stages with their times
     #[arg(short, long, global = true)]
