@@ -84,7 +84,7 @@ impl Toolpath {
 fn multiple(length_mm: f64, unit_mm: f64) -> Option<i32> {
     let times = length_mm / unit_mm;
     let whole = times.round();
-    (whole >= 1.0 && whole < 1e6 && (times - whole).abs() < 1e-6 * whole).then_some(whole as i32)
+    ((1.0..1e6).contains(&whole) && (times - whole).abs() < 1e-6 * whole).then_some(whole as i32)
 }
 
 #[cfg(test)]

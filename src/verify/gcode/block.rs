@@ -261,10 +261,7 @@ fn number(text: &[u8], from: usize, letter: u8, line: u64) -> Result<(f64, usize
 /// Whether what follows a number's digits makes it one in powers of ten. Where a block has a word E it stands
 /// with P alone.
 fn exponent(text: &[u8]) -> bool {
-    match text {
-        [b'e' | b'E', b'0'..=b'9', ..] | [b'e' | b'E', b'+' | b'-', b'0'..=b'9', ..] => true,
-        _ => false,
-    }
+    matches!(text, [b'e' | b'E', b'0'..=b'9', ..] | [b'e' | b'E', b'+' | b'-', b'0'..=b'9', ..])
 }
 
 fn g_group(code: u16, at: Place) -> Result<Option<Group>, Error> {
