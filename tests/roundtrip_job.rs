@@ -378,6 +378,22 @@ fn gcode_and_rml_move_along_the_same_curve() {
     }
 }
 
+/// What a grid makes of a scallop is the same for all posts of a job.
+#[test]
+fn passes_by_scallop_lie_alike_in_all_posts_of_a_job() {
+    let (finish, wanted) = ("tool = \"ball-1\"\nstepover_mm = 0.1", "tool = \"ball-1\"\nscallop_mm = 0.0007");
+    let bench = Bench::with(&[("name = \"linuxcnc-mill\"", OTHERS), (finish, wanted)]);
+    let report = bench.mill(0);
+    let simplify = report["fidelity"]["gouge_budget_mm"]["simplify"].as_f64().expect("a share");
+    for nth in [0, 1] {
+        let (rml, gcode) = (path(&bench, nth, 0.01), path(&bench, nth + 2, 0.01));
+        for (a, b) in [(&gcode, &rml), (&rml, &gcode)] {
+            let (distance, at) = strays(a, b);
+            assert!(distance <= 0.01 + 2.0 * simplify, "{nth}: {distance} at {at:?}");
+        }
+    }
+}
+
 /// Roughing, holes, marks, the slot with its tabs and the run in air too: the same bound as for a finish.
 #[test]
 fn gcode_and_rml_move_along_the_same_curve_beside_the_surface() {

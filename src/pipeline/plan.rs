@@ -16,7 +16,7 @@ use crate::post::{Dialect, Section};
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::tolerance::Budget;
-use crate::toolpath::{self, Rest, Retract, RoughGrid, Site, finish, rough};
+use crate::toolpath::{self, JobGrid, Rest, Retract, Site, finish, rough};
 use crate::verify::{Extent, Reading, Timing};
 
 /// Passes between two places where a zigzag program can start again.
@@ -205,6 +205,11 @@ pub fn programs(
         steepest,
         need.depth_mm,
     )?;
+    let controllers = shop
+        .dialects
+        .iter()
+        .map(|dialect| (dialect.unit_mm, dialect.path_tolerance_mm + dialect.merge_tolerance_mm));
+    let job_grid = JobGrid::of(&controllers.collect::<Vec<_>>());
     let site = Site {
         surface,
         origin_mm: [tile.setup.tile.x_mm, tile.setup.tile.y_mm],
@@ -215,6 +220,7 @@ pub fn programs(
         clearance_mm: tile.clearance_mm,
         retract: None,
         unit_mm: dialect.unit_mm,
+        apart_mm: job_grid.apart_mm(dialect.unit_mm),
         budget,
     };
     let mut planned = PostPrograms {
@@ -224,11 +230,6 @@ pub fn programs(
         left_out: Vec::new(),
         passes: Vec::new(),
     };
-    let controllers = shop
-        .dialects
-        .iter()
-        .map(|dialect| (dialect.unit_mm, dialect.path_tolerance_mm + dialect.merge_tolerance_mm));
-    let rough_grid = RoughGrid::of(&controllers.collect::<Vec<_>>());
     // Last of all, since they go around the others.
     let outlines = |index: &usize| job.operations[*index].kind == job::Kind::Outline;
     let (last, first): (Vec<usize>, Vec<usize>) = (0..job.operations.len()).partition(outlines);
@@ -268,7 +269,7 @@ pub fn programs(
                     ramp_slope: ramp_slope(operation, tool),
                     clear_mm,
                 };
-                let path = rough::rough(&rough_grid.site(&site, &params), &params, &tell);
+                let path = rough::rough(&job_grid.site(&site, &params), &params, &tell);
                 path.and_then(|path| path.in_units(site.unit_mm)).map_err(refused)?
             }
             job::Kind::Finish => {

@@ -86,13 +86,14 @@ pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
     if !(spacing_mm > 0.0 && spacing_mm <= diameter_mm) {
         return Err(Error::Stepover { stepover_mm: spacing_mm, diameter_mm });
     }
-    let stepover = (spacing_mm * length / site.unit_mm + 1e-9).floor();
+    let apart = (spacing_mm * length / site.apart_mm + 1e-9).floor();
     // Moves of neighbouring slanted passes come up to a unit closer or farther than the passes.
     let kept = slope != 0.0 && matches!(params.spacing, Spacing::ScallopMm(_));
-    let stepover = if kept { stepover - 1.0 } else { stepover };
-    if stepover < 1.0 {
-        return Err(Error::StepoverUnit { stepover_mm: spacing_mm, unit_mm: site.unit_mm, hint });
+    let apart = if kept { apart - 1.0 } else { apart };
+    if apart < 1.0 {
+        return Err(Error::StepoverUnit { stepover_mm: spacing_mm, unit_mm: site.apart_mm, hint });
     }
+    let stepover = apart * (site.apart_mm / site.unit_mm).round();
     // Past an open edge as far as the cutter can touch the border's steepest face; past a neighbour's as far as it
     // reaches at all, since a step of the neighbour can keep it that far out.
     let past = 2.0 * site.surface.lattice().step_mm;

@@ -15,6 +15,7 @@ mod envelope;
 pub mod finish;
 mod funnel;
 mod ground;
+mod job_grid;
 mod levels;
 mod link;
 mod passes;
@@ -22,16 +23,15 @@ mod pen;
 mod ramp;
 mod rest;
 pub mod rough;
-mod rough_grid;
 mod slant;
 mod strip;
 mod table;
 mod tilt;
 
+pub use job_grid::JobGrid;
 pub use passes::{Axis, Layout};
 pub use pen::APPROACH_MM;
 pub use rest::Rest;
-pub use rough_grid::RoughGrid;
 pub use tilt::{Tilt, Worst};
 
 use crate::compensation;
@@ -93,6 +93,8 @@ pub struct Site<'a> {
     pub retract: Option<Retract<'a>>,
     /// mm per unit of the controller's grid.
     pub unit_mm: f64,
+    /// Passes lie whole numbers of it apart, in mm: a whole number of units, the same for all controllers of a job.
+    pub apart_mm: f64,
     pub budget: Budget,
 }
 

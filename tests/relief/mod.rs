@@ -76,6 +76,7 @@ pub fn site<'a>(relief: &'a Relief, unit_mm: f64, path_tolerance_mm: f64) -> Sit
         clearance_mm: 2.0,
         retract: None,
         unit_mm,
+        apart_mm: unit_mm,
         budget: Budget::split(0.002, path_tolerance_mm, relief.steepest, relief.top_mm - relief.bottom_mm)
             .unwrap(),
     }

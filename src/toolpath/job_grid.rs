@@ -1,6 +1,7 @@
-//! The grid that roughing is planned on, the same for every controller, so that each roughs a job alike.
+//! What the grids of a job's controllers have in common, so that each of them is given the same work.
 //!
-//! Where a cut ends, which cut it is linked to and how high depends on whole units: on each controller's own grid
+//! Passes of a finish lie whole numbers of the coarsest unit apart. Roughing is planned on one grid altogether:
+//! where a cut ends, which cut it is linked to and how high depends on whole units: on each controller's own grid
 //! the same job would be roughed in another order. What roughing leaves is tenths of a millimetre, and hundredths
 //! are fine enough for it.
 
@@ -19,7 +20,7 @@ const MOST_LOST: f64 = 0.1;
 
 /// What the controllers of a job have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RoughGrid {
+pub struct JobGrid {
     /// The coarsest unit in mm, if it is a whole number of each other one.
     coarsest_mm: Option<f64>,
     /// Whether [`COMMON_MM`] is a whole number of every unit.
@@ -27,13 +28,13 @@ pub struct RoughGrid {
     path_tolerance_mm: f64,
 }
 
-impl RoughGrid {
+impl JobGrid {
     /// For controllers by their unit and path tolerance in mm.
-    pub fn of(controllers: &[(f64, f64)]) -> RoughGrid {
+    pub fn of(controllers: &[(f64, f64)]) -> JobGrid {
         let units = || controllers.iter().map(|controller| controller.0);
         let coarsest_mm = units().fold(0.0, f64::max);
         let holds_all = |grid_mm: f64| units().all(|unit_mm| multiple(grid_mm, unit_mm).is_some());
-        RoughGrid {
+        JobGrid {
             coarsest_mm: holds_all(coarsest_mm).then_some(coarsest_mm),
             common: holds_all(COMMON_MM),
             path_tolerance_mm: controllers
@@ -49,6 +50,12 @@ impl RoughGrid {
         let unit_mm = self.unit_mm([params.stepdown_mm, stepover_mm]);
         let budget = Budget { simplify_mm: 0.0, path_tolerance_mm: self.path_tolerance_mm, ..site.budget };
         Site { unit_mm: unit_mm.unwrap_or(site.unit_mm), budget, ..*site }
+    }
+
+    /// The coarsest unit in mm, on which passes of all of them can lie; that of one of them where it is no whole number
+    /// of the others.
+    pub fn apart_mm(&self, unit_mm: f64) -> f64 {
+        self.coarsest_mm.unwrap_or(unit_mm)
     }
 
     /// The grid in mm for such distances; None where each controller has to keep to its own.
@@ -93,7 +100,7 @@ mod tests {
 
     fn unit_of(units_mm: &[f64], stepdown_mm: f64) -> Option<f64> {
         let controllers: Vec<(f64, f64)> = units_mm.iter().map(|&unit_mm| (unit_mm, 0.0)).collect();
-        RoughGrid::of(&controllers).unit_mm([stepdown_mm, 1.2])
+        JobGrid::of(&controllers).unit_mm([stepdown_mm, 1.2])
     }
 
     #[test]
