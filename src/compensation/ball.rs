@@ -1,6 +1,6 @@
-use super::contact::WIDE;
 use super::field::Field;
 use super::lanes::{LANES, NONE};
+use super::rolling::WIDE;
 use super::slopes::Rises;
 
 /// Offsets d (sample less axis, in samples) at which samples can touch a ball: a box.

@@ -210,7 +210,7 @@ fn raise_line<V: Vectors>(to: &mut [f32], input: &[f32], s: &[f32]) {
 #[derive(Clone, Copy)]
 pub(super) struct BoxRows {
     /// First target, and how many.
-    first: usize,
+    pub first: usize,
     pub count: usize,
     /// dy of the first; the others are `every` less each.
     pub dy: i32,
@@ -292,23 +292,48 @@ pub(super) fn raise_rows<V: Vectors>(
     bounds: impl Fn(usize) -> [i32; 2],
     out: &mut Targets,
 ) {
-    let origin = (first - on.shift) as i32;
-    let z = V::splat(field.row(a)[PAD + first as usize]);
+    let one = One::of::<V>(field, on, [a, first]);
     let mut dy = rows.dy;
     for k in 0..rows.count {
+        one.raise::<V>(on, rows.first + k, dy, bounds(k), out);
+        dy -= on.every as i32;
+    }
+}
+
+/// One sample, on samples.
+pub(super) struct One<G> {
+    /// Column of the target that it stands under.
+    origin: i32,
+    z: G,
+}
+
+impl<G: Copy> One<G> {
+    #[inline(always)]
+    pub fn of<V: Vectors<Group = G>>(field: &Field, on: &OnSamples, [a, first]: [i64; 2]) -> One<G> {
+        One { origin: (first - on.shift) as i32, z: V::splat(field.row(a)[PAD + first as usize]) }
+    }
+
+    /// Raises the target row `b` by it at the offsets `low ..= high` of the cutter's row `dy`.
+    #[inline(always)]
+    pub fn raise<V: Vectors<Group = G>>(
+        &self,
+        on: &OnSamples,
+        b: usize,
+        dy: i32,
+        [low, high]: [i32; 2],
+        out: &mut Targets,
+    ) {
         let arc = on.stencil.arc_there(dy);
-        let [low, high] = bounds(k);
         let (lo, hi) = (low.max(arc.arc.lo), high.min(arc.arc.hi));
-        let start = (origin - hi).max(0) & -(LANES as i32);
-        let end = (origin - lo + 1).min(out.columns as i32);
+        let start = (self.origin - hi).max(0) & -(LANES as i32);
+        let end = (self.origin - lo + 1).min(out.columns as i32);
         if lo <= hi && start < end {
             let length = ((end - start) as usize).next_multiple_of(LANES);
-            let s = &arc.values[arc.index(origin - start)..][..length];
-            let to = &mut out.row_mut(rows.first + k)[start as usize..][..length];
+            let s = &arc.values[arc.index(self.origin - start)..][..length];
+            let to = &mut out.row_mut(b)[start as usize..][..length];
             for (to, s) in groups_mut(to).iter_mut().zip(groups(s)) {
-                V::store(V::greater(V::add(V::load(s), z), V::load(to)), to);
+                V::store(V::greater(V::add(V::load(s), self.z), V::load(to)), to);
             }
         }
-        dy -= on.every as i32;
     }
 }

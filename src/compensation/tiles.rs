@@ -1,3 +1,4 @@
+use super::cones::Cones;
 use super::feed::Feed;
 use super::field::{Field, Sense, Targets};
 use super::lanes::LANES;
@@ -22,6 +23,10 @@ const LEAST_CHORD: f64 = 2.0;
 
 /// Radius of a ball, in samples, from which looking for contacts is less work than every sample.
 const LEAST_SEARCH: f64 = 4.0;
+
+/// Work for a sample, in groups of lanes, from which leaving out by maxima is faster than looking for contacts by a
+/// table: on surfaces that touch a flat bottom's rim nearly everywhere.
+const LISTED: f64 = 180.0;
 
 /// Cutter locations at the samples of `out`, which may reach past the part: the lowest z of the
 /// cutter's lowest point at which it does not cut into `h`. NaN where no data is in reach.
@@ -124,7 +129,9 @@ fn on_samples_into(
             tiles[row / tile_rows * across + column].push(z_mm);
         }
     }
-    let of = OnTile { h, profile, stencil: &stencil, every: every as i64, sense, way };
+    let cones = has_table(profile, way)
+        .then(|| Cones::new(&stencil, profile.reach(), profile.step_mm(), has_chords(profile)));
+    let of = OnTile { h, profile, stencil: &stencil, cones: cones.as_ref(), every: every as i64, sense, way };
     let scratch = || (Field::empty(0, 0), Targets::new(0, 0));
     tiles.into_par_iter().with_max_len(1).enumerate().for_each_init(scratch, |scratch, (k, mut to)| {
         let tile = Window {
@@ -142,6 +149,7 @@ struct OnTile<'a> {
     h: &'a Heights,
     profile: &'a Profile,
     stencil: &'a Stencil,
+    cones: Option<&'a Cones>,
     every: i64,
     sense: Sense,
     way: Way,
@@ -166,7 +174,7 @@ impl OnTile<'_> {
             let (input, pairs) = self.pairs(tile);
             field.fill(self.h, input, self.sense);
             targets.clear(tile.columns, tile.rows);
-            without_search(field, &pairs, self.profile, targets, self.way);
+            without_search(field, &pairs, self.profile, self.cones, targets, self.way);
             for (row, to) in to.iter_mut().enumerate() {
                 self.sense.give_row(to, targets.row(row));
             }
@@ -221,6 +229,19 @@ fn is_searched(profile: &Profile, way: Way) -> bool {
     profile.is_ball() && profile.radius() >= LEAST_SEARCH && way != Way::EveryTap
 }
 
+/// Whether a flat bottom is taken chord by chord.
+fn has_chords(profile: &Profile) -> bool {
+    profile.plateau_mm() / profile.step_mm() >= LEAST_CHORD
+}
+
+/// Whether a table tells where samples can touch.
+fn has_table(profile: &Profile, way: Way) -> bool {
+    !profile.is_ball()
+        && profile.plateau_mm() < profile.radius_mm()
+        && profile.radius() >= bounded::LEAST_RADIUS
+        && way != Way::EveryTap
+}
+
 /// Raises the targets by the field, by whichever way suits the profile.
 pub(super) fn dilate<P: Pairs>(field: &mut Field, pairs: &P, profile: &Profile, targets: &mut Targets) {
     if is_searched(profile, Way::Known) {
@@ -231,15 +252,35 @@ pub(super) fn dilate<P: Pairs>(field: &mut Field, pairs: &P, profile: &Profile, 
             return;
         }
     }
-    without_search(field, pairs, profile, targets, Way::Known);
+    without_search(field, pairs, profile, None, targets, Way::Known);
 }
 
-fn without_search<P: Pairs>(field: &Field, pairs: &P, profile: &Profile, targets: &mut Targets, way: Way) {
-    let plateau = profile.plateau_mm() / profile.step_mm();
-    let chords = plateau >= LEAST_CHORD;
+fn without_search<P: Pairs>(
+    field: &mut Field,
+    pairs: &P,
+    profile: &Profile,
+    cones: Option<&Cones>,
+    targets: &mut Targets,
+    way: Way,
+) {
+    let chords = has_chords(profile);
     if chords {
-        chord::flat_bottom(field, pairs, targets, plateau + 1.0);
+        chord::flat_bottom(field, pairs, targets, profile.plateau_mm() / profile.step_mm() + 1.0);
         if profile.plateau_mm() >= profile.radius_mm() {
+            return;
+        }
+    }
+    if let (Some(cones), Some(pairs)) = (cones, pairs.on_samples()) {
+        let most = match way {
+            Way::Contacts => f64::INFINITY,
+            _ => {
+                let every_tap = brute::work(profile, targets.columns, targets.rows);
+                every_tap.min(LISTED * (targets.columns * targets.rows) as f64)
+            }
+        };
+        let mut given_up = false;
+        contact::contacts_by_table(field, pairs, profile, cones, targets, None, most, &mut given_up);
+        if !given_up {
             return;
         }
     }
@@ -261,8 +302,8 @@ mod tests {
     use super::super::lanes::{Portable, Vectors};
     use super::*;
 
-    /// By the definition and by the way that suits the cutter, one after the other.
-    fn bits<V: Vectors>(h: &Heights, cutter: &str) -> [Vec<u32>; 2] {
+    /// By the definition, by the way that suits the cutter, and by a table.
+    fn bits<V: Vectors>(h: &Heights, cutter: &str) -> [Vec<u32>; 3] {
         let profile = Profile::new(cutter.parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
         let stencil = Stencil::new(&profile, 0.0, 0.0);
         let window = h.window.grown(5);
@@ -313,7 +354,27 @@ mod tests {
                 }
             })
         };
-        [every_tap, pruned]
+        if profile.is_ball() {
+            return [every_tap.clone(), every_tap, pruned];
+        }
+        let cones = Cones::new(&stencil, profile.reach(), profile.step_mm(), has_chords(&profile));
+        let listed = done(&mut |targets| {
+            if has_chords(&profile) {
+                chord::body::<V, _>(
+                    &searched,
+                    &pairs,
+                    targets,
+                    profile.plateau_mm() / profile.step_mm() + 1.0,
+                );
+            }
+            if profile.plateau_mm() < profile.radius_mm() {
+                let (field, most) = (&mut searched, f64::INFINITY);
+                contact::body_by_table::<V, _>(
+                    field, &pairs, &profile, &cones, targets, None, most, &mut false,
+                );
+            }
+        });
+        [every_tap, pruned, listed]
     }
 
     #[test]
@@ -330,8 +391,9 @@ mod tests {
                 "vee:120:0:0.8",
             ];
             for cutter in cutters {
-                let [portable, pruned] = bits::<Portable>(h, cutter);
+                let [portable, pruned, listed] = bits::<Portable>(h, cutter);
                 assert!(portable == pruned, "{cutter} on {name}, portable");
+                assert!(portable == listed, "{cutter} on {name}, portable, by a table");
                 #[cfg(target_arch = "x86_64")]
                 {
                     use super::super::lanes::{Avx2, Avx512};
