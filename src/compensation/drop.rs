@@ -82,9 +82,9 @@ type Places = [[f32; 2]; 2];
 impl<'a> Faces<'a> {
     pub fn new(facets: &'a Facets, profile: &Profile) -> Faces<'a> {
         let meridian = Meridian::new(profile);
-        let rests: Vec<Rest> = facets.faces.iter().map(|face| Rest::new(face, &meridian)).collect();
+        let rests: Vec<Rest> = facets.faces.par_iter().map(|face| Rest::new(face, &meridian)).collect();
         let bands: Vec<Band> =
-            facets.ridges.iter().map(|ridge| Band::new(ridge, facets, &meridian)).collect();
+            facets.ridges.par_iter().map(|ridge| Band::new(ridge, facets, &meridian)).collect();
         let mut all = Faces {
             facets,
             meridian,
@@ -102,9 +102,9 @@ impl<'a> Faces<'a> {
 
     /// Where the axis may stand on each face and edge.
     fn places(&self) -> Vec<Places> {
-        let faces = self.facets.faces.iter().zip(&self.rests);
+        let faces = self.facets.faces.par_iter().zip(&self.rests);
         let faces = faces.map(|(face, rest)| rest.places(self.facets.corners_of(face)));
-        let ridges = self.facets.ridges.iter().zip(&self.bands);
+        let ridges = self.facets.ridges.par_iter().zip(&self.bands);
         let all = faces.chain(ridges.map(|(ridge, band)| band.places(ridge, self.facets)));
         all.map(|places| places.map(|[low, high]| [down(low), up(high)])).collect()
     }

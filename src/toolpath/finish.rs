@@ -1,5 +1,7 @@
 //! Parallel passes over the cutter-location surface, each as few long moves.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::envelope::{Cutter, Envelope};
@@ -154,85 +156,97 @@ fn passes(
     let mut before: Option<(usize, GridPoint)> = None;
     let mut since_retract = 0;
     let mut tilt = Tilt::default();
-    let mut first = 0;
-    while first < passes {
-        let length = match slanted {
-            true => slant::band_length(&layout, first),
-            false => band_length(&layout, first, lattice.step_mm, cutter.reach_mm),
-        };
-        let last = first + length - 1;
+    let band_at = |first: usize| match slanted {
+        true => first..first + slant::band_length(&layout, first),
+        false => first..first + band_length(&layout, first, lattice.step_mm, cutter.reach_mm),
+    };
+    let read = |first: usize| {
+        if slanted || first >= passes {
+            return Ok(None);
+        }
         // The link from the band before is judged in this band.
-        let low_mm = layout.across_mm(first) - longest_mm;
-        let read = || Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), cutter.reach_mm);
-        let strip = if slanted { None } else { Some(read()?) };
-        let ground = strip.as_ref().map(|strip| Ground::new(strip, &cutter));
-        let envelopes = match &ground {
-            Some(ground) => cutter.envelopes(ground.strip, &ground.wide, &layout, first..last + 1),
-            None => slant::envelopes(site, &cutter, &layout, first..last + 1)?,
-        };
-        let planned: Vec<(Vec<Run>, Tilt)> = (first..last + 1)
-            .into_par_iter()
-            .zip(envelopes)
-            .map(|(k, mut envelope)| {
-                if let Some((rest, stay_mm)) = rest {
-                    rest.thin(&layout, k, stay_mm, &mut envelope.cl_mm);
-                }
-                let (mut runs, tilt) = pass(site, params, &layout, k, stepover_mm, &envelope);
-                if backwards(params.pattern, layout.along, k) {
-                    runs.reverse();
-                    runs.iter_mut().for_each(|run| run.reverse());
-                }
-                (runs, tilt)
-            })
-            .collect();
-        planned.iter().for_each(|(_, turned)| tilt.merge(turned));
-        let band: Vec<Vec<Run>> = planned.into_iter().map(|(runs, _)| runs).collect();
-        let joints = joints(&layout, first, &band, before);
-        let links: Vec<Option<i32>> = joints
-            .par_iter()
-            .map(|&(from, to)| match &ground {
-                _ if params.pattern == Pattern::OneWay => Ok(None),
-                Some(ground) => {
-                    let leave_mm = params.stock_to_leave_mm;
-                    Ok(link::level(site, &cutter, ground, from, to, leave_mm, longest_mm))
-                }
-                None => {
-                    let leave_mm = params.stock_to_leave_mm;
-                    link::elsewhere(site, &cutter, layout.along, from, to, leave_mm, longest_mm)
-                }
-            })
-            .collect::<Result<_, Error>>()?;
-        let mut links = links.into_iter();
-        for (offset, runs) in band.iter().enumerate() {
-            let k = first + offset;
-            for (nth, run) in runs.iter().enumerate() {
-                let start = [run[0][0], layout.across(k, run[0][0]), run[0][1]];
-                let linked = match before {
-                    Some((_, from)) if nth == 0 => links.next().flatten().map(|z| (from, z)),
-                    _ => None,
-                };
-                let forced = params.restart_passes > 0 && since_retract >= params.restart_passes;
-                match linked.filter(|_| !forced) {
-                    Some((from, z)) => {
-                        pen.cut(layout.along.point(from[0], from[1], z));
-                        pen.cut(layout.along.point(start[0], start[1], z));
-                        pen.cut(layout.along.point(start[0], start[1], start[2]));
+        let (low_mm, last) = (layout.across_mm(first) - longest_mm, band_at(first).end - 1);
+        Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), cutter.reach_mm).map(Some)
+    };
+    let mut first = 0;
+    let mut strip = read(first)?;
+    while first < passes {
+        let Range { end, .. } = band_at(first);
+        let cut = || -> Result<(), Error> {
+            let ground = strip.as_ref().map(|strip| Ground::new(strip, &cutter));
+            let envelopes = match &ground {
+                Some(ground) => cutter.envelopes(ground.strip, &ground.wide, &layout, first..end),
+                None => slant::envelopes(site, &cutter, &layout, first..end)?,
+            };
+            let planned: Vec<(Vec<Run>, Tilt)> = (first..end)
+                .into_par_iter()
+                .zip(envelopes)
+                .map(|(k, mut envelope)| {
+                    if let Some((rest, stay_mm)) = rest {
+                        rest.thin(&layout, k, stay_mm, &mut envelope.cl_mm);
+                    }
+                    let (mut runs, tilt) = pass(site, params, &layout, k, stepover_mm, &envelope);
+                    if backwards(params.pattern, layout.along, k) {
+                        runs.reverse();
+                        runs.iter_mut().for_each(|run| run.reverse());
+                    }
+                    (runs, tilt)
+                })
+                .collect();
+            planned.iter().for_each(|(_, turned)| tilt.merge(turned));
+            let band: Vec<Vec<Run>> = planned.into_iter().map(|(runs, _)| runs).collect();
+            let joints = joints(&layout, first, &band, before);
+            let links: Vec<Option<i32>> = joints
+                .par_iter()
+                .map(|&(from, to)| match &ground {
+                    _ if params.pattern == Pattern::OneWay => Ok(None),
+                    Some(ground) => {
+                        let leave_mm = params.stock_to_leave_mm;
+                        Ok(link::level(site, &cutter, ground, from, to, leave_mm, longest_mm))
                     }
                     None => {
-                        let top = pen.top();
-                        pen.begin(layout.along.point(start[0], start[1], start[2]), top);
-                        since_retract = 0;
+                        let leave_mm = params.stock_to_leave_mm;
+                        link::elsewhere(site, &cutter, layout.along, from, to, leave_mm, longest_mm)
                     }
+                })
+                .collect::<Result<_, Error>>()?;
+            let mut links = links.into_iter();
+            for (offset, runs) in band.iter().enumerate() {
+                let k = first + offset;
+                for (nth, run) in runs.iter().enumerate() {
+                    let start = [run[0][0], layout.across(k, run[0][0]), run[0][1]];
+                    let linked = match before {
+                        Some((_, from)) if nth == 0 => links.next().flatten().map(|z| (from, z)),
+                        _ => None,
+                    };
+                    let forced = params.restart_passes > 0 && since_retract >= params.restart_passes;
+                    match linked.filter(|_| !forced) {
+                        Some((from, z)) => {
+                            pen.cut(layout.along.point(from[0], from[1], z));
+                            pen.cut(layout.along.point(start[0], start[1], z));
+                            pen.cut(layout.along.point(start[0], start[1], start[2]));
+                        }
+                        None => {
+                            let top = pen.top();
+                            pen.begin(layout.along.point(start[0], start[1], start[2]), top);
+                            since_retract = 0;
+                        }
+                    }
+                    for &[u, z] in &run[1..] {
+                        pen.cut(layout.along.point(u, layout.across(k, u), z));
+                    }
+                    let end = run[run.len() - 1];
+                    before = Some((k, [end[0], layout.across(k, end[0]), end[1]]));
                 }
-                for &[u, z] in &run[1..] {
-                    pen.cut(layout.along.point(u, layout.across(k, u), z));
-                }
-                let end = run[run.len() - 1];
-                before = Some((k, [end[0], layout.across(k, end[0]), end[1]]));
+                since_retract += 1;
             }
-            since_retract += 1;
-        }
-        first = last + 1;
+            Ok(())
+        };
+        // Much of reading is work for one thread, so the next band is read meanwhile.
+        let (done, next) = rayon::join(cut, || read(end));
+        done?;
+        strip = next?;
+        first = end;
         progress(first as f64 / passes as f64);
     }
     let mut path = pen.finish();

@@ -15,7 +15,8 @@ pub(super) struct Ground<'a> {
 impl<'a> Ground<'a> {
     pub(super) fn new(strip: &'a Strip, cutter: &Cutter) -> Ground<'a> {
         let step_mm = cutter.exact.profile().step_mm();
-        Ground { strip, wide: cutter.faces(strip), places: Places::new(&strip.heights, step_mm) }
+        let (wide, places) = rayon::join(|| cutter.faces(strip), || Places::new(&strip.heights, step_mm));
+        Ground { strip, wide, places }
     }
 
     /// Lowest height in mm at which the cutter may go straight from one place to another (along,

@@ -157,30 +157,45 @@ fn profiles(site: &Site, params: &Params, layout: Layout, progress: Progress) ->
     let reach_mm = cutter.reach_mm + between_mm;
     let border = Border::read(site.surface, layout.along, params.clear_mm.max(lattice.step_mm))?;
     let mut rows: Vec<Row> = Vec::with_capacity(layout.passes.len());
+    let passes = layout.passes.len();
+    let band_end = |first: usize| first + band_length(&layout, first, lattice.step_mm, reach_mm);
+    let read = |first: usize| {
+        if first >= passes {
+            return Ok(None);
+        }
+        let (low_mm, high_mm) =
+            (layout.across_mm(first) - stepover_mm, layout.across_mm(band_end(first) - 1));
+        Strip::read(site.surface, &layout, low_mm, high_mm, reach_mm).map(Some)
+    };
     let mut first = 0;
-    while first < layout.passes.len() {
-        let last = first + band_length(&layout, first, lattice.step_mm, reach_mm) - 1;
-        let low_mm = layout.across_mm(first) - stepover_mm;
-        let strip = Strip::read(site.surface, &layout, low_mm, layout.across_mm(last), reach_mm)?;
-        let envelopes = cutter.widened(&strip, &cutter.faces(&strip), &layout, first..last + 1);
-        let middles = (first..last + 1).map(|k| layout.across_mm(k) - 0.5 * stepover_mm);
-        let faces = Faces::new(&strip.facets, between.profile());
-        let between = cutter.rows(&strip, &between, &faces, &layout, middles);
-        let band: Vec<Row> = (first..last + 1)
-            .into_par_iter()
-            .zip(envelopes)
-            .zip(between)
-            .map(|((k, envelope), between)| {
-                let across_mm = layout.across_mm(k);
-                let between = stretches(site, params, &between, (coarse / layout.pitch) as usize);
-                let floor_mm = |along_mm| border.floor_mm(along_mm, across_mm, size_mm);
-                let profiles = row_profiles(site, params, &layout, &envelope, floor_mm);
-                Row { across: layout.passes[k], profiles, between }
-            })
-            .collect();
+    let mut strip = read(first)?;
+    while let Some(here) = &strip {
+        let end = band_end(first);
+        let band = || -> Vec<Row> {
+            let (wide, faces) =
+                rayon::join(|| cutter.faces(here), || Faces::new(&here.facets, between.profile()));
+            let envelopes = cutter.widened(here, &wide, &layout, first..end);
+            let middles = (first..end).map(|k| layout.across_mm(k) - 0.5 * stepover_mm);
+            let between = cutter.rows(here, &between, &faces, &layout, middles);
+            (first..end)
+                .into_par_iter()
+                .zip(envelopes)
+                .zip(between)
+                .map(|((k, envelope), between)| {
+                    let across_mm = layout.across_mm(k);
+                    let between = stretches(site, params, &between, (coarse / layout.pitch) as usize);
+                    let floor_mm = |along_mm| border.floor_mm(along_mm, across_mm, size_mm);
+                    let profiles = row_profiles(site, params, &layout, &envelope, floor_mm);
+                    Row { across: layout.passes[k], profiles, between }
+                })
+                .collect()
+        };
+        // Much of reading is work for one thread, so the next band is read meanwhile.
+        let (band, next) = rayon::join(band, || read(end));
         rows.extend(band);
-        first = last + 1;
-        progress(first as f64 / layout.passes.len() as f64);
+        strip = next?;
+        first = end;
+        progress(first as f64 / passes as f64);
     }
     Ok(Plan { layout, rows, coarse })
 }
