@@ -1,12 +1,15 @@
 //! `screenmill compensate`: where a cutter can stand over a part, and what it leaves.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::sync_channel;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use screenmill::compensation::{self, Band, Profile};
 use screenmill::cutter::Shape;
 use screenmill::grid::{Heights, Lattice};
-use screenmill::surface::{HeightWriter, Kind, Opened, Surface, open};
+use screenmill::surface::{self, HeightWriter, Kind, Opened, Surface, open};
+use screenmill::whole::publish_all;
 use serde_json::json;
 
 use super::part::Part;
@@ -64,35 +67,76 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         .into());
     }
     let mut files = Files::create(arguments, surface.as_ref(), &lattice)?;
-    let mut found = Found::default();
     let progress = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new(lattice.rows as u64) };
     if let Ok(style) = ProgressStyle::with_template("compensate {wide_bar} {pos}/{len} rows {eta}") {
         progress.set_style(style);
     }
-    compensation::stream(
-        &lattice,
-        &profile,
-        every,
-        with_closing,
-        |window| Ok::<_, Refusal>(surface.heights(window, 0.0)?),
-        |cl| {
-            if exact && cl.window.rows > 0 {
-                let reach_mm = profile.radius_mm();
-                let last = cl.window.row + ((cl.window.rows - 1) * every) as i64;
-                let low_mm =
-                    [lattice.x_mm(cl.window.column) - reach_mm, lattice.y_mm(cl.window.row) - reach_mm];
-                let high_mm =
-                    [lattice.x_mm(cl.window.column_end()) + reach_mm, lattice.y_mm(last) + reach_mm];
-                compensation::lift(cl, every, &profile, &surface.outlines(low_mm, high_mm));
+    let started = Instant::now();
+    let [mut reading, mut lifting, mut waiting] = [Duration::ZERO; 3];
+    // A band is written while the next one is worked out.
+    let (bands, to_write) = sync_channel::<Band>(0);
+    let (streamed, written) = std::thread::scope(|scope| {
+        let progress = &progress;
+        let writer = scope.spawn(move || -> Result<(Files, Found, Duration), Refusal> {
+            let (mut found, mut writing) = (Found::default(), Duration::ZERO);
+            for band in to_write {
+                let started = Instant::now();
+                found.see(&band);
+                files.write(&band)?;
+                progress.inc(band.heights.window.rows as u64);
+                writing += started.elapsed();
             }
-            Ok(())
-        },
-        |band| {
-            found.see(&band);
-            progress.inc(band.heights.window.rows as u64);
-            files.write(&band)
-        },
-    )?;
+            Ok((files, found, writing))
+        });
+        let streamed = compensation::stream(
+            &lattice,
+            &profile,
+            every,
+            with_closing,
+            |window| {
+                let started = Instant::now();
+                let heights = surface.heights(window, 0.0).map_err(|error| Stop::Refused(error.into()));
+                reading += started.elapsed();
+                heights
+            },
+            |cl| {
+                if exact && cl.window.rows > 0 {
+                    let started = Instant::now();
+                    let reach_mm = profile.radius_mm();
+                    let last = cl.window.row + ((cl.window.rows - 1) * every) as i64;
+                    let low_mm =
+                        [lattice.x_mm(cl.window.column) - reach_mm, lattice.y_mm(cl.window.row) - reach_mm];
+                    let high_mm =
+                        [lattice.x_mm(cl.window.column_end()) + reach_mm, lattice.y_mm(last) + reach_mm];
+                    compensation::lift(cl, every, &profile, &surface.outlines(low_mm, high_mm));
+                    lifting += started.elapsed();
+                }
+                Ok(())
+            },
+            |band| {
+                let started = Instant::now();
+                let sent = bands.send(band).map_err(|_| Stop::Writer);
+                waiting += started.elapsed();
+                sent
+            },
+        );
+        drop(bands);
+        (streamed, writer.join())
+    });
+    let (files, found, writing) = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+    if let Err(Stop::Refused(refusal)) = streamed {
+        return Err(refusal);
+    }
+    if common.verbose {
+        let all = started.elapsed();
+        let compensating = all.saturating_sub(reading + lifting + waiting);
+        let stages = [("reading", reading), ("compensating", compensating), ("lifting", lifting)];
+        for (stage, time) in stages {
+            eprintln!("{stage}: {:.2} s", time.as_secs_f64());
+        }
+        let waited = waiting.as_secs_f64();
+        eprintln!("writing: {:.2} s, of which {waited:.2} s were waited for", writing.as_secs_f64());
+    }
     progress.finish_and_clear();
     if found.samples == 0 {
         return Err(compensation::Error::NoData { samples: lattice.window().samples() }.into());
@@ -137,6 +181,13 @@ fn free_bytes() -> Option<u64> {
     let told = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = told.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| 1024 * kilobytes)
+}
+
+/// Why bands are no longer made.
+enum Stop {
+    Refused(Refusal),
+    /// What takes them is gone, and says why itself.
+    Writer,
 }
 
 /// What was found on the way.
@@ -194,11 +245,13 @@ impl Files {
     }
 
     fn finish(self) -> Result<Vec<String>, Refusal> {
-        let mut names = Vec::new();
+        let (mut names, mut files) = (Vec::new(), Vec::new());
         for (name, writer) in [self.cl, self.closing, self.residual].into_iter().flatten() {
-            writer.finish()?;
+            files.push(writer.whole()?);
             names.push(name);
         }
+        publish_all(files)
+            .map_err(|(path, source)| surface::Error::Unwritable { path: name(&path), source })?;
         Ok(names)
     }
 }

@@ -47,8 +47,9 @@ pub fn stream_bytes(lattice: &Lattice, profile: &Profile, with_closing: bool) ->
     let reach = profile.reach();
     let halo = if with_closing { reach } else { 0 };
     let width = lattice.columns + 2 * (halo + reach);
-    // The part with its halo, the rows cut (twice while they grow), and four bands of results.
-    let rows = rows + 2 * (halo + reach) + 2 * (rows + 2 * halo) + 4 * rows;
+    // The part with its halo, the rows cut (twice while they grow), and four bands of results, with those of the
+    // band before on their way to a file.
+    let rows = rows + 2 * (halo + reach) + 2 * (rows + 2 * halo) + 8 * rows;
     4 * width as u64 * rows as u64
 }
 

@@ -155,19 +155,16 @@ impl HeightImage {
                 };
                 for row in start..(start + group + 1).min(rows) {
                     self.line(row, 0..columns, &mut line)?;
-                    for (column, &z) in line.iter().enumerate() {
-                        if z.is_infinite() {
-                            let path = self.raw.path.clone();
-                            return Err(Error::InfiniteHeight { path, column: column as u64, row, value: z });
-                        }
-                        range = [range[0].min(z), range[1].max(z)];
+                    let [least, most] = [-extreme(&line, |z| -z), extreme(&line, |z| z)];
+                    if (least == f64::NEG_INFINITY || most == f64::INFINITY)
+                        && let Some((column, &value)) = line.iter().enumerate().find(|(_, z)| z.is_infinite())
+                    {
+                        let path = self.raw.path.clone();
+                        return Err(Error::InfiniteHeight { path, column: column as u64, row, value });
                     }
-                    for pair in line.windows(2) {
-                        steep[0] = steep[0].max(slope(pair[0], pair[1]));
-                    }
-                    for (a, b) in line.iter().zip(&before) {
-                        steep[1] = steep[1].max(slope(*a, *b));
-                    }
+                    range = [range[0].min(least), range[1].max(most)];
+                    steep[0] = steep[0].max(steepest(&line, &line[1..], slope));
+                    steep[1] = steep[1].max(steepest(&line, &before, slope));
                     std::mem::swap(&mut line, &mut before);
                 }
                 Ok((range, steep))
@@ -222,12 +219,14 @@ impl HeightImage {
             return Ok(heights);
         };
         let span = first..(last + 2).min(columns);
+        let as_they_are = as_they_are(&places);
         heights.z_mm.par_chunks_mut(16 * window.columns).enumerate().try_for_each(|(chunk, out)| {
             let mut lines = [(u64::MAX, Vec::new()), (u64::MAX, Vec::new())];
             for (index, out) in out.chunks_mut(window.columns).enumerate() {
                 let row = window.row + (chunk * 16 + index) as i64;
                 let Some((below, share_y)) = self.between(self.lattice.y_mm(row), rows) else { continue };
-                for wanted in [below, (below + 1).min(rows - 1)] {
+                let above = if share_y == 0.0 { below } else { (below + 1).min(rows - 1) };
+                for wanted in [below, above] {
                     if lines.iter().all(|line| line.0 != wanted) {
                         let older = usize::from(lines[1].0 == u64::MAX || lines[0].0 > lines[1].0);
                         let older = if lines[0].0 == u64::MAX { 0 } else { older };
@@ -236,7 +235,13 @@ impl HeightImage {
                     }
                 }
                 let find = |wanted: u64| &lines[usize::from(lines[0].0 != wanted)].1;
-                let (low, high) = (find(below), find((below + 1).min(rows - 1)));
+                let (low, high) = (find(below), find(above));
+                if let (Some(run), 0.0) = (&as_they_are, share_y) {
+                    for (z, height) in out[run.clone()].iter_mut().zip(low) {
+                        *z = (height - datum_mm) as f32;
+                    }
+                    continue;
+                }
                 for (z, place) in out.iter_mut().zip(&places) {
                     let Some((left, share_x)) = *place else { continue };
                     let left = (left - first) as usize;
@@ -256,6 +261,42 @@ impl HeightImage {
         })?;
         Ok(heights)
     }
+}
+
+/// Where samples are the pixels one after the other, if they are.
+fn as_they_are(places: &[Option<(u64, f64)>]) -> Option<std::ops::Range<usize>> {
+    let start = places.iter().position(Option::is_some)?;
+    let end = places.iter().rposition(Option::is_some)? + 1;
+    let first = places[start]?.0;
+    let pixels = (first..).map(|pixel| Some((pixel, 0.0)));
+    places[start..end].iter().copied().eq(pixels.take(end - start)).then_some(start..end)
+}
+
+/// Values looked at together.
+const LANES: usize = 16;
+
+/// The greatest of what is made of these; -inf of nothing and of what is no number.
+fn extreme(line: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+    let mut most = [f64::NEG_INFINITY; LANES];
+    for part in line.chunks(LANES) {
+        for (most, z) in most.iter_mut().zip(part) {
+            let z = of(*z);
+            *most = if z > *most { z } else { *most };
+        }
+    }
+    most.into_iter().fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// The greatest slope between pairs of heights; 0 of none.
+fn steepest(line: &[f64], other: &[f64], slope: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut most = [0.0; LANES];
+    for (a, b) in line.chunks(LANES).zip(other.chunks(LANES)) {
+        for (most, (a, b)) in most.iter_mut().zip(a.iter().zip(b)) {
+            let slope = slope(*a, *b);
+            *most = if slope > *most { slope } else { *most };
+        }
+    }
+    most.into_iter().fold(0.0, f64::max)
 }
 
 impl Surface for HeightImage {

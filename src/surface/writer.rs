@@ -150,7 +150,13 @@ impl HeightWriter {
     }
 
     /// Gives the file its name. Without this nothing is left.
-    pub fn finish(mut self) -> Result<(), Error> {
+    pub fn finish(self) -> Result<(), Error> {
+        let name = self.name.clone();
+        self.whole()?.publish().map_err(|source| Error::Unwritable { path: name, source })
+    }
+
+    /// The file with all that belongs in it, still without its name.
+    pub fn whole(mut self) -> Result<Whole, Error> {
         if self.given != self.rows {
             return Err(Error::Unfinished { path: self.name, given: self.given, rows: self.rows });
         }
@@ -159,7 +165,7 @@ impl HeightWriter {
             encode_png(self.file.file_mut(), values, self.columns, self.rows).map_err(io)?;
         }
         self.file.flush().map_err(io)?;
-        self.file.publish().map_err(io)
+        Ok(self.file)
     }
 }
 
@@ -171,8 +177,12 @@ enum Kind {
 }
 
 /// No data has one spelling, whatever sign arithmetic gave it.
-fn put_floats(line: &[f32], out: &mut Vec<u8>, to: fn(f32) -> [u8; 4]) {
-    out.extend(line.iter().flat_map(|&z| to(if z.is_nan() { f32::NAN } else { z })));
+fn put_floats(line: &[f32], out: &mut Vec<u8>, to: impl Fn(f32) -> [u8; 4]) {
+    let start = out.len();
+    out.resize(start + 4 * line.len(), 0);
+    for (bytes, &z) in out[start..].as_chunks_mut().0.iter_mut().zip(line) {
+        *bytes = to(if z.is_nan() { f32::NAN } else { z });
+    }
 }
 
 fn encode_png(out: &mut File, values: &mut File, columns: usize, rows: usize) -> std::io::Result<()> {
