@@ -25,8 +25,10 @@ const LEAST_CHORD: f64 = 2.0;
 const LEAST_SEARCH: f64 = 4.0;
 
 /// Work for a sample, in groups of lanes, from which leaving out by maxima is faster than looking for contacts by a
-/// table: on surfaces that touch a flat bottom's rim nearly everywhere.
-const LISTED: f64 = 180.0;
+/// table, as on surfaces that touch a flat bottom's rim nearly everywhere; and as part of taking every sample, where
+/// that is more.
+const LISTED: f64 = 100.0;
+const LISTED_PART: f64 = 0.03;
 
 /// Cutter locations at the samples of `out`, which may reach past the part: the lowest z of the
 /// cutter's lowest point at which it does not cut into `h`. NaN where no data is in reach.
@@ -275,7 +277,7 @@ fn without_search<P: Pairs>(
             Way::Contacts => f64::INFINITY,
             _ => {
                 let every_tap = brute::work(profile, targets.columns, targets.rows);
-                every_tap.min(LISTED * (targets.columns * targets.rows) as f64)
+                every_tap.min((LISTED * (targets.columns * targets.rows) as f64).max(LISTED_PART * every_tap))
             }
         };
         let mut given_up = false;
