@@ -6,6 +6,7 @@
 //! fulfil this. They are made from the values of the stencil itself, so they hold for every profile;
 //! where its rows are concave little else lies between.
 
+use super::Profile;
 use super::lanes::{LANES, Vectors};
 use super::runs::Offsets;
 use super::slopes::Rises;
@@ -23,6 +24,7 @@ const OUT: f32 = 1e9;
 /// For one cutter on samples.
 #[derive(Debug)]
 pub(super) struct Cones {
+    pub profile: Profile,
     /// Row dy of the cutter stands at dy + reach of each table's rows.
     pub reach: i32,
     stride: usize,
@@ -50,8 +52,8 @@ pub(super) struct Slopes {
 
 impl Cones {
     /// The samples under a flat bottom are left out if asked.
-    pub fn new(stencil: &Stencil, reach: usize, step_mm: f64, skip_flat: bool) -> Cones {
-        let reach = reach as i32;
+    pub fn new(profile: &Profile, stencil: &Stencil, skip_flat: bool) -> Cones {
+        let (reach, step_mm) = (profile.reach() as i32, profile.step_mm());
         let rows = 2 * reach as usize + 1;
         let stride = rows.next_multiple_of(LANES) + LANES;
         let table = |value: f32| vec![value; 2 * SLOPES * stride];
@@ -103,7 +105,7 @@ impl Cones {
             beyond[start..].reverse();
         }
         let per_step = (1.0 / step_mm) as f32;
-        Cones { reach, stride, per_step, low, across: [above, below], rim, within, beyond }
+        Cones { profile: *profile, reach, stride, per_step, low, across: [above, below], rim, within, beyond }
     }
 
     /// Which rise of the tables is no more than this one.

@@ -102,22 +102,20 @@ pub(super) fn body<V: Vectors, P: Pairs>(
 
 widest! {
     /// As [`contacts`], of any cutter on samples, by a table; the samples under its flat bottom are left out.
-    fn contacts_by_table<P: Pairs>(field: &mut Field, pairs: &P, profile: &Profile, cones: &Cones, out: &mut Targets, feed: Option<&mut Feed<'_, '_>>, most: f64, given_up: &mut bool) = body_by_table
+    fn contacts_by_table<P: Pairs>(field: &mut Field, pairs: &P, cones: &Cones, out: &mut Targets, feed: Option<&mut Feed<'_, '_>>, most: f64, given_up: &mut bool) = body_by_table
 }
 
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
 pub(super) fn body_by_table<V: Vectors, P: Pairs>(
     field: &mut Field,
     pairs: &P,
-    profile: &Profile,
     cones: &Cones,
     out: &mut Targets,
     feed: Option<&mut Feed<'_, '_>>,
     most: f64,
     given_up: &mut bool,
 ) {
-    *given_up = !search::<V, P, _>(Listed::<V>::new(cones), profile, field, pairs, out, feed, most);
+    *given_up = !search::<V, P, _>(Listed::<V>::new(cones), &cones.profile, field, pairs, out, feed, most);
 }
 
 /// False if it was given up.

@@ -131,8 +131,7 @@ fn on_samples_into(
             tiles[row / tile_rows * across + column].push(z_mm);
         }
     }
-    let cones = has_table(profile, way)
-        .then(|| Cones::new(&stencil, profile.reach(), profile.step_mm(), has_chords(profile)));
+    let cones = has_table(profile, way).then(|| Cones::new(profile, &stencil, has_chords(profile)));
     let of = OnTile { h, profile, stencil: &stencil, cones: cones.as_ref(), every: every as i64, sense, way };
     let scratch = || (Field::empty(0, 0), Targets::new(0, 0));
     tiles.into_par_iter().with_max_len(1).enumerate().for_each_init(scratch, |scratch, (k, mut to)| {
@@ -281,7 +280,7 @@ fn without_search<P: Pairs>(
             }
         };
         let mut given_up = false;
-        contact::contacts_by_table(field, pairs, profile, cones, targets, None, most, &mut given_up);
+        contact::contacts_by_table(field, pairs, cones, targets, None, most, &mut given_up);
         if !given_up {
             return;
         }
@@ -359,7 +358,7 @@ mod tests {
         if profile.is_ball() {
             return [every_tap.clone(), every_tap, pruned];
         }
-        let cones = Cones::new(&stencil, profile.reach(), profile.step_mm(), has_chords(&profile));
+        let cones = Cones::new(&profile, &stencil, has_chords(&profile));
         let listed = done(&mut |targets| {
             if has_chords(&profile) {
                 chord::body::<V, _>(
@@ -371,9 +370,7 @@ mod tests {
             }
             if profile.plateau_mm() < profile.radius_mm() {
                 let (field, most) = (&mut searched, f64::INFINITY);
-                contact::body_by_table::<V, _>(
-                    field, &pairs, &profile, &cones, targets, None, most, &mut false,
-                );
+                contact::body_by_table::<V, _>(field, &pairs, &cones, targets, None, most, &mut false);
             }
         });
         [every_tap, pruned, listed]
