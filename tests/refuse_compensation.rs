@@ -93,3 +93,40 @@ fn more_memory_than_there_is_is_refused_with_the_figure() {
     assert!(said.contains("GB are free; hint: "), "{said}");
     assert!(!closing.exists());
 }
+
+/// A part of nothing but zeros, which takes no room on the disk but some seconds under a cutter.
+#[test]
+#[cfg(unix)]
+fn an_interrupted_command_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = folder.path().join("part.npy");
+    let shape = [20_000, 5_000];
+    let mut file = fs::File::create(&part).expect("a scratch file");
+    let options =
+        npyz::WriteOptions::<f32>::new().dtype(npyz::DType::new_scalar("<f4".parse().expect("a type")));
+    options.shape(&shape).writer(&mut file).write_header_only().expect("a header");
+    let head = file.metadata().expect("a file").len();
+    file.set_len(head + 4 * shape[0] * shape[1]).expect("a sparse file");
+    for rest in [["compensate", "--cutter=ball:4", "--cl"], ["raster", "--step-mm=0.01", "--out"]] {
+        let out = tempfile::tempdir().expect("a folder");
+        let is_empty = || fs::read_dir(out.path()).expect("a folder").next().is_none();
+        let program = std::process::Command::new(assert_cmd::cargo::cargo_bin("screenmill"))
+            .args(rest)
+            .arg(out.path().join("a.npy"))
+            .arg(&part)
+            .args(["--pixel-mm", "0.01", "--quiet", "--threads", "1"])
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("started");
+        while is_empty() {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        let kill = std::process::Command::new("kill").args(["-INT", &program.id().to_string()]).status();
+        assert!(kill.expect("sent").success());
+        let ended = program.wait_with_output().expect("ended");
+        assert_eq!(ended.status.code(), Some(2), "{rest:?}");
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(said, "error: interrupted; nothing was written\n", "{rest:?}");
+        assert!(is_empty(), "{rest:?}");
+    }
+}

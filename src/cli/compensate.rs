@@ -8,12 +8,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use screenmill::compensation::{self, Band, Profile};
 use screenmill::cutter::Shape;
 use screenmill::grid::{Heights, Lattice};
+use screenmill::pipeline;
 use screenmill::surface::{self, HeightWriter, Kind, Opened, Surface, open};
 use screenmill::whole::publish_all;
 use serde_json::json;
 
 use super::part::Part;
-use super::{Common, Outcome, Refusal};
+use super::{Common, Outcome, Refusal, console};
 
 /// A residual above this is a cavity and not rounding.
 const CAVITY_MM: f32 = 1e-5;
@@ -94,6 +95,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
             every,
             with_closing,
             |window| {
+                if console::interrupted() {
+                    return Err(Stop::Refused(pipeline::Error::Interrupted.into()));
+                }
                 let started = Instant::now();
                 let heights = surface.heights(window, 0.0).map_err(|error| Stop::Refused(error.into()));
                 reading += started.elapsed();
@@ -221,6 +225,7 @@ impl Files {
         let create = |path: &Option<PathBuf>, rows: usize, range_mm: [f64; 2]| {
             let create = |path: &PathBuf| -> Result<(String, HeightWriter), Refusal> {
                 let writer = HeightWriter::create(path, lattice.columns, rows, lattice.step_mm, range_mm)?;
+                console::unfinished(writer.hidden());
                 Ok((name(path), writer))
             };
             path.as_ref().map(create).transpose()

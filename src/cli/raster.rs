@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use screenmill::grid::{Lattice, Window};
+use screenmill::pipeline;
 use screenmill::surface::{HeightWriter, Kind, Opened, Surface, open};
 use serde_json::json;
 
 use super::part::Part;
-use super::{Common, Outcome, Refusal};
+use super::{Common, Outcome, Refusal, console};
 
 /// Samples held at once: 32 MiB of floats.
 const BAND_SAMPLES: usize = 1 << 23;
@@ -29,6 +30,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let range_mm = png_range(arguments, surface.as_ref(), &mut notes);
     let mut writer =
         HeightWriter::create(&arguments.out, lattice.columns, lattice.rows, lattice.step_mm, range_mm)?;
+    console::unfinished(writer.hidden());
     let seen = write(surface.as_ref(), &lattice, &mut writer, common)?;
     writer.finish()?;
     let kind = match kind {
@@ -94,6 +96,9 @@ fn write(
         progress.set_style(style);
     }
     for row in (0..lattice.rows).step_by(band) {
+        if console::interrupted() {
+            return Err(pipeline::Error::Interrupted.into());
+        }
         let rows = band.min(lattice.rows - row);
         let window = Window { column: 0, row: row as i64, columns: lattice.columns, rows };
         let heights = surface.heights(window, 0.0)?;

@@ -149,6 +149,11 @@ impl HeightWriter {
         Ok(())
     }
 
+    /// Where the file is until it has its name.
+    pub fn hidden(&self) -> &Path {
+        self.file.hidden()
+    }
+
     /// Gives the file its name. Without this nothing is left.
     pub fn finish(self) -> Result<(), Error> {
         let name = self.name.clone();
