@@ -67,79 +67,15 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         }
         .into());
     }
-    let mut files = Files::create(arguments, surface.as_ref(), &lattice)?;
+    let files = Files::create(arguments, surface.as_ref(), &lattice)?;
     let progress = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new(lattice.rows as u64) };
     if let Ok(style) = ProgressStyle::with_template("compensate {wide_bar} {pos}/{len} rows {eta}") {
         progress.set_style(style);
     }
-    let started = Instant::now();
-    let [mut reading, mut lifting, mut waiting] = [Duration::ZERO; 3];
-    // A band is written while the next one is worked out.
-    let (bands, to_write) = sync_channel::<Band>(0);
-    let (streamed, written) = std::thread::scope(|scope| {
-        let progress = &progress;
-        let writer = scope.spawn(move || -> Result<(Files, Found, Duration), Refusal> {
-            let (mut found, mut writing) = (Found::default(), Duration::ZERO);
-            for band in to_write {
-                let started = Instant::now();
-                found.see(&band);
-                files.write(&band)?;
-                progress.inc(band.heights.window.rows as u64);
-                writing += started.elapsed();
-            }
-            Ok((files, found, writing))
-        });
-        let streamed = compensation::stream(
-            &lattice,
-            &profile,
-            every,
-            with_closing,
-            |window| {
-                if console::interrupted() {
-                    return Err(Stop::Refused(pipeline::Error::Interrupted.into()));
-                }
-                let started = Instant::now();
-                let heights = surface.heights(window, 0.0).map_err(|error| Stop::Refused(error.into()));
-                reading += started.elapsed();
-                heights
-            },
-            |cl| {
-                if exact && cl.window.rows > 0 {
-                    let started = Instant::now();
-                    let reach_mm = profile.radius_mm();
-                    let last = cl.window.row + ((cl.window.rows - 1) * every) as i64;
-                    let low_mm =
-                        [lattice.x_mm(cl.window.column) - reach_mm, lattice.y_mm(cl.window.row) - reach_mm];
-                    let high_mm =
-                        [lattice.x_mm(cl.window.column_end()) + reach_mm, lattice.y_mm(last) + reach_mm];
-                    compensation::lift(cl, every, &profile, &surface.outlines(low_mm, high_mm));
-                    lifting += started.elapsed();
-                }
-                Ok(())
-            },
-            |band| {
-                let started = Instant::now();
-                let sent = bands.send(band).map_err(|_| Stop::Writer);
-                waiting += started.elapsed();
-                sent
-            },
-        );
-        drop(bands);
-        (streamed, writer.join())
-    });
-    let (files, found, writing) = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-    if let Err(Stop::Refused(refusal)) = streamed {
-        return Err(refusal);
-    }
+    let work = Work { surface: surface.as_ref(), lattice, profile, every, with_closing, exact };
+    let (files, found, times) = work.stream(files, &progress)?;
     if common.verbose {
-        let all = started.elapsed();
-        let compensating = all.saturating_sub(reading + lifting + waiting);
-        let stages = [("reading", reading), ("compensating", compensating), ("lifting", lifting)];
-        for (stage, time) in stages {
-            eprintln!("{stage}: {:.2} s", time.as_secs_f64());
-        }
-        let waited = waiting.as_secs_f64();
-        eprintln!("writing: {:.2} s, of which {waited:.2} s were waited for", writing.as_secs_f64());
+        times.tell();
     }
     progress.finish_and_clear();
     if found.samples == 0 {
@@ -185,6 +121,106 @@ fn free_bytes() -> Option<u64> {
     let told = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = told.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| 1024 * kilobytes)
+}
+
+/// What is to be done with a part, band by band.
+struct Work<'a> {
+    surface: &'a dyn Surface,
+    lattice: Lattice,
+    profile: Profile,
+    every: usize,
+    with_closing: bool,
+    /// Whether locations are lifted to the exact drop on the part's faces.
+    exact: bool,
+}
+
+impl Work<'_> {
+    /// Writes a band while the next one is worked out.
+    fn stream(&self, mut files: Files, progress: &ProgressBar) -> Result<(Files, Found, Times), Refusal> {
+        let started = Instant::now();
+        let mut times = Times::default();
+        let (bands, to_write) = sync_channel::<Band>(0);
+        let (streamed, written) = std::thread::scope(|scope| {
+            let writer = scope.spawn(move || -> Result<(Files, Found, Duration), Refusal> {
+                let (mut found, mut writing) = (Found::default(), Duration::ZERO);
+                for band in to_write {
+                    let started = Instant::now();
+                    found.see(&band);
+                    files.write(&band)?;
+                    progress.inc(band.heights.window.rows as u64);
+                    writing += started.elapsed();
+                }
+                Ok((files, found, writing))
+            });
+            let streamed = compensation::stream(
+                &self.lattice,
+                &self.profile,
+                self.every,
+                self.with_closing,
+                |window| {
+                    if console::interrupted() {
+                        return Err(Stop::Refused(pipeline::Error::Interrupted.into()));
+                    }
+                    let heights = timed(&mut times.reading, || self.surface.heights(window, 0.0));
+                    heights.map_err(|error| Stop::Refused(error.into()))
+                },
+                |cl| {
+                    timed(&mut times.lifting, || self.lift(cl));
+                    Ok(())
+                },
+                |band| timed(&mut times.waiting, || bands.send(band)).map_err(|_| Stop::Writer),
+            );
+            drop(bands);
+            (streamed, writer.join())
+        });
+        let (files, found, writing) = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        if let Err(Stop::Refused(refusal)) = streamed {
+            return Err(refusal);
+        }
+        (times.writing, times.all) = (writing, started.elapsed());
+        Ok((files, found, times))
+    }
+
+    fn lift(&self, cl: &mut Heights) {
+        if !self.exact || cl.window.rows == 0 {
+            return;
+        }
+        let (lattice, reach_mm) = (&self.lattice, self.profile.radius_mm());
+        let last = cl.window.row + ((cl.window.rows - 1) * self.every) as i64;
+        let low_mm = [lattice.x_mm(cl.window.column) - reach_mm, lattice.y_mm(cl.window.row) - reach_mm];
+        let high_mm = [lattice.x_mm(cl.window.column_end()) + reach_mm, lattice.y_mm(last) + reach_mm];
+        compensation::lift(cl, self.every, &self.profile, &self.surface.outlines(low_mm, high_mm));
+    }
+}
+
+/// How long each stage took.
+#[derive(Default)]
+struct Times {
+    all: Duration,
+    reading: Duration,
+    lifting: Duration,
+    /// Beside the others, but for what they waited for it.
+    writing: Duration,
+    waiting: Duration,
+}
+
+impl Times {
+    fn tell(&self) {
+        let compensating = self.all.saturating_sub(self.reading + self.lifting + self.waiting);
+        let stages = [("reading", self.reading), ("compensating", compensating), ("lifting", self.lifting)];
+        for (stage, time) in stages {
+            eprintln!("{stage}: {:.2} s", time.as_secs_f64());
+        }
+        let [writing, waited] = [self.writing, self.waiting].map(|time| time.as_secs_f64());
+        eprintln!("writing: {writing:.2} s, of which {waited:.2} s were waited for");
+    }
+}
+
+fn timed<T>(sum: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let started = Instant::now();
+    let done = work();
+    *sum += started.elapsed();
+    done
 }
 
 /// Why bands are no longer made.
