@@ -183,6 +183,11 @@ impl Cutter {
         contact.and_then(|t| self.lift_mm(t)) == Some(0.0)
     }
 
+    /// How far to both sides of a line its heights have to be known, in mm; None where a slope says enough.
+    pub(super) fn beside_mm(&self) -> Option<f64> {
+        (self.aside_mm > self.budget.raster_mm).then_some(self.aside_mm)
+    }
+
     /// How far from its line the cutter may be, sideways and by the controller.
     pub(super) fn strays_mm(&self) -> f64 {
         self.budget.path_tolerance_mm + self.aside_mm
@@ -345,14 +350,20 @@ impl Cutter {
         let above = (tip * tip - contact * contact).sqrt();
         // From one position to the next it may be farther than along the line.
         let pitch_mm = self.pitch_mm + self.aside_mm;
-        // Sideways a concave height rises by no more than its slope.
-        let sideways_mm = self.aside_mm * strayed / (tip * tip - strayed * strayed).sqrt();
-        let bulge_mm = tip * tip * pitch_mm * pitch_mm / (8.0 * above * above * above) + sideways_mm;
+        let centre = (tip * tip - strayed * strayed).sqrt();
+        let sideways_mm = match self.beside_mm() {
+            // Between the higher of both sides and what lies between them.
+            Some(aside_mm) => tip * tip * aside_mm * aside_mm / (2.0 * centre * centre * centre),
+            // Sideways a concave height rises by no more than its slope.
+            None => self.aside_mm * strayed / centre,
+        };
+        let bulge_mm = tip * tip * pitch_mm * pitch_mm / (8.0 * above * above * above);
+        // The steep way takes no less sideways.
         if bulge_mm > BULGE_MOST * self.pitch_mm {
             return None;
         }
-        let controller_mm = self.budget.path_tolerance_mm * tip / (tip * tip - strayed * strayed).sqrt();
-        let bulge_lift_mm = (bulge_mm - self.budget.raster_mm).max(0.0);
+        let controller_mm = self.budget.path_tolerance_mm * tip / centre;
+        let bulge_lift_mm = (bulge_mm + sideways_mm - self.budget.raster_mm).max(0.0);
         Some(bulge_lift_mm + (controller_mm - self.budget.controller_mm).max(0.0))
     }
 }

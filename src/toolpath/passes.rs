@@ -96,7 +96,9 @@ impl Axis {
 ///   across = passes[k] + round(slope (along + origin))         slope in -1 .. 1, 0 along an axis
 /// ```
 ///
-/// so passes are one another shifted by whole units, and their positions half a unit from a line at most.
+/// so passes are one another shifted by whole units, and their positions half a unit from a line at most. Where they
+/// lie and where they end is decided by the line, in whole units of the coarsest grid of the job: the same passes for
+/// all of its controllers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     pub along: Axis,
@@ -110,8 +112,10 @@ pub struct Layout {
     pub count: usize,
     /// Where the passes lie across, in units, rising.
     pub passes: Vec<i32>,
-    /// Lowest and highest place across of a position that is cut.
+    /// Lowest and highest place across of a line that is cut.
     across: [i32; 2],
+    /// Between the positions at which a pass may end; a whole number of pitches.
+    between_ends: i64,
     /// The tile's corner along the passes, in units.
     origin: i64,
 }
@@ -126,33 +130,37 @@ impl Layout {
     ) -> Layout {
         let lattice = site.surface.lattice();
         let unit = site.unit_mm;
+        let coarse = ((site.apart_mm / unit).round() as i64).max(1);
         let (length_mm, breadth_mm) = along.split([lattice.width_mm, lattice.height_mm]);
-        let (origin_u, origin_v) = along.split(site.origin_mm.map(|o| (o / unit).round() as i64));
-        let pitch = ((lattice.step_mm / unit + 1e-9).floor() as i64).max(1);
+        let coarse_mm = coarse as f64 * unit;
+        let (origin_u, origin_v) =
+            along.split(site.origin_mm.map(|o| (o / coarse_mm).round() as i64 * coarse));
+        let between_ends = ((lattice.step_mm / coarse_mm + 1e-9).floor() as i64).max(1) * coarse;
+        let pitch = pitch(between_ends, lattice.step_mm / unit);
         let span = |origin: i64, length_mm: f64, overrun_mm: f64| {
             // Outwards, so that passes of all grids end at the same positions.
-            let low = (-overrun_mm / unit + 1e-6).floor() as i64 + origin;
-            (low, ((length_mm + overrun_mm) / unit - 1e-6).ceil() as i64 + origin)
+            let low = (-overrun_mm / coarse_mm + 1e-6).floor() as i64 * coarse + origin;
+            (low, ((length_mm + overrun_mm) / coarse_mm - 1e-6).ceil() as i64 * coarse + origin)
         };
-        let counted =
-            |step: i64, (low, high): (i64, i64)| (low.div_euclid(step), -((-high).div_euclid(step)));
-        let (first, last) = counted(pitch, span(origin_u, length_mm, overrun_mm[0]));
+        let (low, high) = span(origin_u, length_mm, overrun_mm[0]);
+        let first = low.div_euclid(between_ends) * between_ends;
+        let last = -(-high).div_euclid(between_ends) * between_ends;
         let across = span(origin_v, breadth_mm, overrun_mm[1]);
-        let risen = [first, last].map(|i| (slope * (i * pitch) as f64).round() as i64);
-        let lines = (across.0 - risen[0].max(risen[1]), across.1 - risen[0].min(risen[1]));
-        let (low, high) = counted(i64::from(stepover), lines);
-        // A straight pass is cut wherever it lies.
-        let inside = if slope == 0.0 { (i64::from(i32::MIN), i64::from(i32::MAX)) } else { across };
+        let risen = [first, last].map(|u| slope * u as f64);
+        let passes = [(across.0, risen[0].max(risen[1])), (across.1, risen[0].min(risen[1]))]
+            .map(|(end, risen)| (end as f64 - risen) / f64::from(stepover));
+        let (lowest, highest) = ((passes[0] + 1e-6).floor() as i64, (passes[1] - 1e-6).ceil() as i64);
         let within = |v: i64| (v - origin_v).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
         Layout {
             along,
             slope,
             unit_mm: unit,
-            start: (first * pitch - origin_u) as i32,
+            start: (first - origin_u) as i32,
             pitch: pitch as i32,
-            count: (last - first + 1) as usize,
-            passes: (low..=high).map(|k| (k * i64::from(stepover) - origin_v) as i32).collect(),
-            across: [within(inside.0), within(inside.1)],
+            count: ((last - first) / pitch + 1) as usize,
+            passes: (lowest..=highest).map(|k| (k * i64::from(stepover) - origin_v) as i32).collect(),
+            across: [within(across.0), within(across.1)],
+            between_ends,
             origin: origin_u,
         }
     }
@@ -162,9 +170,19 @@ impl Layout {
         self.passes[k] + (self.slope * (i64::from(along) + self.origin) as f64).round() as i32
     }
 
-    /// Whether position `i` of pass `k` is to be cut.
+    /// Whether position `i` of pass `k` is to be cut: a straight pass wherever it lies, a slanted one between those of
+    /// its ends that are inside.
     pub(super) fn covers(&self, k: usize, i: usize) -> bool {
-        (self.across[0]..=self.across[1]).contains(&self.across(k, self.at(i)))
+        if self.slope == 0.0 {
+            return true;
+        }
+        let along = i64::from(self.at(i)) + self.origin;
+        let before = along.div_euclid(self.between_ends) * self.between_ends;
+        let after = -(-along).div_euclid(self.between_ends) * self.between_ends;
+        [before, after].into_iter().all(|along| {
+            let across = f64::from(self.passes[k]) + self.slope * along as f64;
+            across >= f64::from(self.across[0]) - 1e-3 && across <= f64::from(self.across[1]) + 1e-3
+        })
     }
 
     /// The rectangle (along, across) in mm of positions `from ..= to` of some passes; None where none of them is cut.
@@ -176,8 +194,10 @@ impl Layout {
     ) -> Option<([f64; 2], [f64; 2])> {
         let (u, v) = ([from, to].map(|i| self.at(i)), [passes.start, passes.end - 1]);
         let ends = [(v[0], u[0]), (v[0], u[1]), (v[1], u[0]), (v[1], u[1])].map(|(k, u)| self.across(k, u));
-        let low = ends.into_iter().min()?.max(self.across[0]);
-        let high = ends.into_iter().max()?.min(self.across[1]);
+        let (mut low, mut high) = (ends.into_iter().min()?, ends.into_iter().max()?);
+        if self.slope != 0.0 {
+            (low, high) = (low.max(self.across[0] - 1), high.min(self.across[1] + 1));
+        }
         let mm = |units: i32| f64::from(units) * self.unit_mm;
         (low <= high).then(|| ([mm(u[0]), mm(low)], [mm(u[1]), mm(high)]))
     }
@@ -187,9 +207,14 @@ impl Layout {
         self.pitch_mm() * self.slope.hypot(1.0)
     }
 
-    /// How far a move passes a position between its ends, in mm.
+    /// How far a move, whose ends are on the grid, passes the line between them, in mm.
     pub(super) fn aside_mm(&self) -> f64 {
-        if self.slope == 0.0 { 0.0 } else { self.unit_mm }
+        let off = |i: usize| {
+            let risen = self.slope * (i64::from(self.at(i)) + self.origin) as f64;
+            (risen - risen.round()).abs()
+        };
+        // One pass is as good as any: they lie whole units apart.
+        (0..self.count).map(off).fold(0.0, f64::max) * self.unit_mm
     }
 
     /// Between passes in mm, as the cutter meets them.
@@ -198,9 +223,11 @@ impl Layout {
         Some(f64::from(second - first) * self.unit_mm / self.slope.hypot(1.0))
     }
 
-    /// Position `i` of pass `k`, along and across in mm.
+    /// Position `i` on the line of pass `k`, along and across in mm.
     pub(super) fn turned_mm(&self, k: usize, i: usize) -> [f64; 2] {
-        [self.at(i), self.across(k, self.at(i))].map(|units| f64::from(units) * self.unit_mm)
+        let along = self.at(i);
+        let risen = self.slope * (i64::from(along) + self.origin) as f64;
+        [f64::from(along), f64::from(self.passes[k]) + risen].map(|units| units * self.unit_mm)
     }
 
     /// First position along a pass in mm.
@@ -218,16 +245,26 @@ impl Layout {
         f64::from(self.passes[k]) * self.unit_mm
     }
 
-    /// Position `i` of pass `k` in the tile's frame.
+    /// Position `i` on the line of pass `k` in the tile's frame.
     pub(super) fn place_mm(&self, k: usize, i: usize) -> [f64; 2] {
-        let [x, y, _] = self.along.point(self.at(i), self.across(k, self.at(i)), 0);
-        [f64::from(x) * self.unit_mm, f64::from(y) * self.unit_mm]
+        let [along_mm, across_mm] = self.turned_mm(k, i);
+        match self.along {
+            Axis::X => [along_mm, across_mm],
+            Axis::Y => [across_mm, along_mm],
+        }
     }
 
     /// Place along a pass of position `i`, in units.
     pub(super) fn at(&self, i: usize) -> i32 {
         self.start + i as i32 * self.pitch
     }
+}
+
+/// The longest distance between positions, in units, that is no longer than a step and goes into `between_ends`; a unit
+/// at least.
+fn pitch(between_ends: i64, step: f64) -> i64 {
+    let least = (between_ends as f64 / step - 1e-9).ceil().max(1.0) as i64;
+    (least..between_ends).find(|parts| between_ends % parts == 0).map_or(1, |parts| between_ends / parts)
 }
 
 /// Radius in mm of the round tip, 0 if there is none.

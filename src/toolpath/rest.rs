@@ -11,6 +11,9 @@ use crate::compensation::{self, Profile};
 use crate::grid::Window;
 use crate::surface::Surface;
 
+/// Where a place is the same on grids of which one counts to it in other units, in mm.
+const SAME_MM: f64 = 1e-6;
+
 /// Samples along each side of a block that is worked out at once.
 const BLOCK: usize = 1024;
 
@@ -68,12 +71,12 @@ impl Rest {
 
     /// Whether a cutter at a place of the tile's frame touches what was left.
     pub fn near(&self, place_mm: [f64; 2]) -> bool {
-        let row = (place_mm[1] / self.step_mm).floor() as i64 - self.first_row;
+        let row = ((place_mm[1] + SAME_MM) / self.step_mm).floor() as i64 - self.first_row;
         let Some(stretches) = usize::try_from(row).ok().and_then(|row| self.rows.get(row)) else {
             return false;
         };
-        let after = stretches.partition_point(|stretch| stretch[0] <= place_mm[0]);
-        after > 0 && place_mm[0] <= stretches[after - 1][1]
+        let after = stretches.partition_point(|stretch| stretch[0] - SAME_MM <= place_mm[0]);
+        after > 0 && place_mm[0] <= stretches[after - 1][1] + SAME_MM
     }
 
     /// Takes those cutter locations out of a pass that need not be cut: all that are not near, but for gaps of up to

@@ -1,7 +1,7 @@
 //! Bounds of passes that run at an angle to the samples.
 //!
-//! A slanted pass stands on the grid points next to a line, half a unit from it at most. A move between two of
-//! them passes the others within a unit; by that much more the cutter is allowed to stray sideways here.
+//! Heights are those of a line. A slanted pass stands on the grid points next to it, half a unit from it at most, and
+//! so does a move between two of them; by that much more the cutter is allowed to stray sideways here.
 
 use std::ops::Range;
 
@@ -80,16 +80,23 @@ impl Block<'_> {
     /// Raises an envelope over the positions `from ..= to` of pass `k`.
     fn bound(&self, k: usize, from: usize, to: usize, envelope: &mut Envelope) {
         let mut near = None;
+        let mut beside_mm: Vec<f64> = vec![f64::NEG_INFINITY; to + 1 - from];
         for i in from..=to {
             if !self.layout.covers(k, i) {
                 continue;
             }
-            let place = self.layout.turned_mm(k, i);
-            let sampled = self.places.drop_mm(self.cutter.exact.profile(), place, &mut near);
-            let z_mm = self.exact.lift_point(place, sampled);
+            let [along, across] = self.layout.turned_mm(k, i);
+            let mut drop_mm = |place: [f64; 2]| {
+                let sampled = self.places.drop_mm(self.cutter.exact.profile(), place, &mut near);
+                self.exact.lift_point(place, sampled)
+            };
+            let z_mm = drop_mm([along, across]);
             if z_mm.is_finite() {
                 envelope.cl_mm[i] = z_mm as f32;
                 envelope.bound_mm[i] = envelope.bound_mm[i].max(z_mm);
+                let sides = self.cutter.beside_mm().map(|aside_mm| [across - aside_mm, across + aside_mm]);
+                beside_mm[i - from] =
+                    sides.into_iter().flatten().map(|across| drop_mm([along, across])).fold(z_mm, f64::max);
             }
         }
         let mut wide: Option<(usize, f64)> = None;
@@ -111,7 +118,7 @@ impl Block<'_> {
                     })
                 });
                 let (left, right) = match contact.and_then(|t| self.cutter.lift_mm(t)) {
-                    Some(lift_mm) => (left + lift_mm, right + lift_mm),
+                    Some(lift_mm) => (beside_mm[i - from] + lift_mm, beside_mm[i + 1 - from] + lift_mm),
                     None => {
                         let before = wide.filter(|w| w.0 == i).map(|w| w.1);
                         let a = before.unwrap_or_else(|| self.widened(k, i, &mut near));
