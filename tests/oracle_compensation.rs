@@ -64,7 +64,7 @@ fn a_large_ball_on_every_surface() {
 
 #[test]
 fn flats_on_every_surface() {
-    cutter_locations(&["flat:0.02", "flat:0.2", "flat:0.5", "flat:0.73"], 80);
+    cutter_locations(&["flat:0.02", "flat:0.2", "flat:0.5", "flat:0.73", "flat:0.7"], 80);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 use super::Profile;
 use super::lanes::{LANES, NONE};
+use super::profile::REACH_MM;
 
 /// No data between two arcs' values, so that groups of lanes may run over the ends of an arc.
 const PADDING: usize = 3 * LANES;
@@ -87,7 +88,7 @@ impl Stencil {
                 hi = dx as i32;
                 row.push(s_mm as f32);
                 deepest = deepest.min(s_mm as f32);
-                if s_mm == 0.0 && distance_mm <= plateau_mm {
+                if s_mm == 0.0 && distance_mm <= plateau_mm + REACH_MM {
                     if flat_lo > flat_hi {
                         flat_lo = dx as i32;
                     }
