@@ -174,3 +174,45 @@ fn nothing_is_left_of_a_file_that_was_not_finished() {
     assert!(writer.finish().unwrap_err().to_string().contains("10 of 301 rows"));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+/// Two solids of two triangles each, as a text.
+fn text_stl() -> String {
+    let mut text = String::new();
+    for (name, x) in [("left hand", 0.0), ("", 3.0)] {
+        text += &format!("solid {name}\n");
+        for [b, c] in [[[4, 0], [4, 2]], [[4, 2], [0, 2]]] {
+            text += " facet normal 0 0 1\n  outer loop\n";
+            for [dx, dy] in [[0, 0], b, c] {
+                text += &format!("   vertex {}e0 {dy} {}\n", x + f64::from(dx), x - 1.5);
+            }
+            text += "  endloop\n endfacet\n";
+        }
+        text += &format!("endsolid {name}\n");
+    }
+    text
+}
+
+#[test]
+fn every_solid_of_a_text_is_read_however_it_is_spelt() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.stl");
+    let text = text_stl();
+    let mut latin = text.clone().into_bytes();
+    latin[8] = 0xFC;
+    let spelt: [Vec<u8>; 6] = [
+        text.clone().into(),
+        text.to_uppercase().into(),
+        text.replace('\n', "\r\n").into(),
+        text.replace("solid \n", "solid\n").replace("endfacet\n", "endfacet ").into(),
+        format!("\u{feff} \n\n{text}").into(),
+        latin,
+    ];
+    for bytes in spelt {
+        fs::write(&path, bytes).unwrap();
+        let (surface, heights) = read(&path, &Options::at_step(0.5));
+        assert_eq!([surface.lattice().columns, surface.lattice().rows], [14, 4]);
+        for (k, z) in heights.z_mm.iter().enumerate() {
+            assert_eq!(*z, if k % 14 < 6 { -1.5 } else { 1.5 }, "{k}");
+        }
+    }
+}

@@ -55,8 +55,10 @@ pub enum Error {
         "{path}: not an STL: {found} bytes, neither \"solid\" at the start nor the 84 bytes of a binary header; hint: export it as binary STL"
     )]
     StlHeader { path: String, found: u64 },
-    #[error("{path}: ASCII STL, after {triangles} triangles: {reason}; hint: export it as binary STL")]
-    StlText { path: String, triangles: u64, reason: String },
+    #[error(
+        "{path}: ASCII STL, line {line}, after {triangles} triangles: {wanted} expected, found {found}; hint: export it as binary STL"
+    )]
+    StlText { path: String, line: u64, triangles: u64, wanted: &'static str, found: String },
     #[error("{path}: the mesh has no triangles; hint: export the body, not an empty selection")]
     NoTriangles { path: String },
     #[error(

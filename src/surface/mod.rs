@@ -15,6 +15,7 @@ mod png;
 mod raw;
 mod samples;
 mod stl;
+mod stl_text;
 mod tiff;
 mod transform;
 mod writer;

@@ -1,17 +1,20 @@
 //! STL files, binary and ASCII.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::mesh::Triangles;
-use super::{Error, Mesh};
+use super::{Error, Mesh, stl_text};
 
 /// Bytes of a binary STL before its triangles, and of each triangle.
 const HEADER: u64 = 84;
 const TRIANGLE: u64 = 50;
+
+/// Some editors put it before a text.
+const BOM: [u8; 3] = [0xEF, 0xBB, 0xBF];
 
 /// The unit an STL was written in; the format does not say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -150,8 +153,12 @@ fn corners(path: &Path, name: &str) -> Result<Vec<[[f32; 3]; 3]>, Error> {
     let announced = u64::from(u32::from_le_bytes([head[80], head[81], head[82], head[83]]));
     let wanted = HEADER + TRIANGLE * announced;
     // Exporters exist that begin a binary file with "solid": its length tells the two apart.
-    if head.starts_with(b"solid") && !(read == HEADER as usize && wanted == found) {
-        return ascii(file, name);
+    let binary = read == HEADER as usize && wanted == found;
+    let blank =
+        head[..read].iter().take_while(|&&byte| byte.is_ascii_whitespace() || BOM.contains(&byte)).count();
+    if !binary && head[blank..].get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) {
+        file.seek(SeekFrom::Start(blank as u64)).map_err(io)?;
+        return stl_text::corners(BufReader::new(file), name);
     }
     if found < HEADER {
         return Err(Error::StlHeader { path: name.into(), found });
@@ -167,23 +174,7 @@ fn corners(path: &Path, name: &str) -> Result<Vec<[[f32; 3]; 3]>, Error> {
     Ok(corners)
 }
 
-fn ascii(file: File, name: &str) -> Result<Vec<[[f32; 3]; 3]>, Error> {
-    let mut corners: Vec<[[f32; 3]; 3]> = Vec::new();
-    let refused = |triangles: usize, error: std::io::Error| Error::StlText {
-        path: name.into(),
-        triangles: triangles as u64,
-        reason: error.to_string().chars().take(200).collect(),
-    };
-    let mut reader = Overlaid { head: b"solid ", after: 5, file, at: 0 };
-    for triangle in stl_io::create_stl_reader(&mut reader).map_err(|e| refused(0, e))? {
-        let triangle = triangle.map_err(|e| refused(corners.len(), e))?;
-        corners.push(triangle.vertices.map(|v| v.0));
-    }
-    Ok(corners)
-}
-
-/// A file with another beginning. The reader takes what starts with "solid " for text: a binary
-/// file that does so, and a text whose solid has no name, need the beginning that it expects.
+/// A file with another beginning: the reader takes a binary file that starts with "solid " for text.
 struct Overlaid {
     head: &'static [u8],
     /// Where in the file reading goes on after the head.
