@@ -17,8 +17,8 @@ use super::ball::Ball;
 use super::blocks::{Block, Lanes, ROWS, measure};
 use super::cones::Cones;
 use super::feed::Feed;
-use super::field::{Field, Targets};
-use super::lanes::{LANES, Vectors, widest};
+use super::field::{Field, PAD, Targets};
+use super::lanes::{LANES, LEAST, Vectors, widest};
 use super::listed::Listed;
 use super::pairs::Pairs;
 use super::rolling::Rolling;
@@ -214,12 +214,13 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 continue;
             }
             let [one, other] = self.known[column];
+            let grain_mm = self.grain_mm(block);
             let known = if one.rises.holds(&all) {
                 Some(one)
             } else if other.rises.holds(&all) {
                 Some(other)
             } else {
-                self.facet(&all)
+                self.facet(&all, grain_mm)
             };
             self.raise_level(a, rows, &mut level, out);
             match known {
@@ -229,7 +230,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 }
                 None => {
                     if self.in_reach(block, &all) {
-                        self.split(block, out);
+                        self.split(block, grain_mm, out);
                         if self.work as f64 > self.most {
                             return;
                         }
@@ -240,13 +241,20 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
         self.raise_level(a, rows, &mut level, out);
     }
 
+    /// About by how much the rises of one plane differ because its heights are rounded.
+    #[inline(always)]
+    fn grain_mm(&self, block: Block) -> f32 {
+        let size = self.field.row(block.a)[PAD + block.first].abs();
+        if size < -LEAST { size * f32::EPSILON } else { 0.0 }
+    }
+
     /// The offsets of a block, if they are few.
     #[inline(always)]
-    fn facet(&self, all: &Rises) -> Option<Known<T::At>> {
+    fn facet(&self, all: &Rises, grain_mm: f32) -> Option<Known<T::At>> {
         if all.spread() > 4.0 * self.alike_mm {
             return None;
         }
-        let rises = all.wider(0.12 * self.alike_mm);
+        let rises = all.wider(greater(0.12 * self.alike_mm, grain_mm));
         self.touch.few(&rises).map(|at| Known { rises, at })
     }
 
@@ -279,11 +287,11 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
 
     /// A block of more than one facet.
     #[inline(always)]
-    fn split(&mut self, block: Block, out: &mut Targets) {
+    fn split(&mut self, block: Block, grain_mm: f32, out: &mut Targets) {
         self.work += ROW_WORK;
         self.lanes.fill::<V>(self.field, block);
         let mut left = self.lanes.data;
-        self.facets(block, &mut left, out);
+        self.facets(block, grain_mm, &mut left, out);
         if left != [0; ROWS] {
             let on = On { field: self.field, pairs: self.pairs };
             self.work += self.touch.rest(on, block, &self.lanes, &left, out);
@@ -293,7 +301,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
     /// Takes the samples of a block that lie on facets: on those of the blocks before it and of
     /// those below, and on others that show themselves.
     #[inline(always)]
-    fn facets(&mut self, block: Block, left: &mut [u16; ROWS], out: &mut Targets) {
+    fn facets(&mut self, block: Block, grain_mm: f32, left: &mut [u16; ROWS], out: &mut Targets) {
         let column = block.first / LANES;
         let before = self.known[column.saturating_sub(1)];
         let after = self.known[column + 1];
@@ -324,7 +332,8 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
             }
         }
         for _ in 0..3 {
-            let level = self.lanes.level::<V>(left, 0.1 * self.alike_mm);
+            let within_mm = greater(0.1 * self.alike_mm, grain_mm);
+            let level = self.lanes.level::<V>(left, within_mm);
             if count(&level) < MANY {
                 break;
             }
@@ -337,7 +346,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 bits &= bits - 1;
             }
             let seed = self.lanes.at(r, bits.trailing_zeros() as usize);
-            let Some(known) = self.facet(&seed) else { break };
+            let Some(known) = self.facet(&seed, grain_mm) else { break };
             let held = self.lanes.held::<V>(left, &known.rises);
             let count = count(&held);
             for (left, held) in left.iter_mut().zip(&held) {
@@ -366,6 +375,11 @@ pub(super) fn spans_of(block: Block, bits: &[u16; ROWS]) -> [Span; ROWS] {
         let end = LANES - bits.leading_zeros() as usize;
         [block.first + first, end.saturating_sub(first)]
     })
+}
+
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 #[inline(always)]
