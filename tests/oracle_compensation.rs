@@ -200,7 +200,7 @@ fn lifted_locations_are_the_true_drop() {
         let out = Window { column: -6, row: 46, columns: 172, rows: 3 };
         let sampled = fast::cutter_location_rows(&h, &profile, out, 2);
         let mut lifted = sampled.clone();
-        fast::lift(&mut lifted, 2, &profile, &faces);
+        fast::lift(lifted.window, &mut lifted.z_mm, 2, &profile, &faces);
         let mut raised_mm: f64 = 0.0;
         for (i, (lifted, sampled)) in lifted.z_mm.iter().zip(&sampled.z_mm).enumerate() {
             assert!(lifted >= sampled);

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use screenmill::compensation::{self, Band, Profile};
 use screenmill::cutter::Shape;
-use screenmill::grid::{Heights, Lattice};
+use screenmill::grid::{Lattice, Window};
 use screenmill::pipeline;
 use screenmill::surface::{self, HeightWriter, Kind, Opened, Surface, open};
 use screenmill::whole::publish_all;
@@ -18,6 +18,9 @@ use super::{Common, Outcome, Refusal, console};
 
 /// A residual above this is a cavity and not rounding.
 const CAVITY_MM: f32 = 1e-5;
+
+/// Samples that are looked at together.
+const LANES: usize = 16;
 
 /// Writes the locations of a cutter over a part, and what it can and cannot reach
 #[derive(clap::Args, Clone, Debug)]
@@ -140,15 +143,20 @@ impl Work<'_> {
         let started = Instant::now();
         let mut times = Times::default();
         let (bands, to_write) = sync_channel::<Band>(0);
+        // Two bands take turns.
+        let (used, to_use) = sync_channel::<Band>(2);
+        let columns = self.lattice.columns;
         let (streamed, written) = std::thread::scope(|scope| {
             let writer = scope.spawn(move || -> Result<(Files, Found, Duration), Refusal> {
                 let (mut found, mut writing) = (Found::default(), Duration::ZERO);
                 for band in to_write {
                     let started = Instant::now();
                     found.see(&band);
-                    files.write(&band)?;
-                    progress.inc(band.heights.window.rows as u64);
+                    files.write(&band, columns)?;
+                    progress.inc(band.rows as u64);
                     writing += started.elapsed();
+                    // Nobody takes the last ones.
+                    let _ = used.send(band);
                 }
                 Ok((files, found, writing))
             });
@@ -157,18 +165,23 @@ impl Work<'_> {
                 &self.profile,
                 self.every,
                 self.with_closing,
-                |window| {
+                |window, z_mm| {
                     if console::interrupted() {
                         return Err(Stop::Refused(pipeline::Error::Interrupted.into()));
                     }
-                    let heights = timed(&mut times.reading, || self.surface.heights(window, 0.0));
-                    heights.map_err(|error| Stop::Refused(error.into()))
+                    let read = timed(&mut times.reading, || self.surface.heights_onto(window, 0.0, z_mm));
+                    read.map_err(|error| Stop::Refused(error.into()))
                 },
-                |cl| {
-                    timed(&mut times.lifting, || self.lift(cl));
+                |window, z_mm| {
+                    timed(&mut times.lifting, || self.lift(window, z_mm));
                     Ok(())
                 },
-                |band| timed(&mut times.waiting, || bands.send(band)).map_err(|_| Stop::Writer),
+                |band| {
+                    let full = std::mem::take(band);
+                    timed(&mut times.waiting, || bands.send(full)).map_err(|_| Stop::Writer)?;
+                    *band = to_use.try_recv().unwrap_or_default();
+                    Ok(())
+                },
             );
             drop(bands);
             (streamed, writer.join())
@@ -181,15 +194,16 @@ impl Work<'_> {
         Ok((files, found, times))
     }
 
-    fn lift(&self, cl: &mut Heights) {
-        if !self.exact || cl.window.rows == 0 {
+    fn lift(&self, window: Window, z_mm: &mut [f32]) {
+        if !self.exact || window.rows == 0 {
             return;
         }
         let (lattice, reach_mm) = (&self.lattice, self.profile.radius_mm());
-        let last = cl.window.row + ((cl.window.rows - 1) * self.every) as i64;
-        let low_mm = [lattice.x_mm(cl.window.column) - reach_mm, lattice.y_mm(cl.window.row) - reach_mm];
-        let high_mm = [lattice.x_mm(cl.window.column_end()) + reach_mm, lattice.y_mm(last) + reach_mm];
-        compensation::lift(cl, self.every, &self.profile, &self.surface.outlines(low_mm, high_mm));
+        let last = window.row + ((window.rows - 1) * self.every) as i64;
+        let low_mm = [lattice.x_mm(window.column) - reach_mm, lattice.y_mm(window.row) - reach_mm];
+        let high_mm = [lattice.x_mm(window.column_end()) + reach_mm, lattice.y_mm(last) + reach_mm];
+        let outlines = self.surface.outlines(low_mm, high_mm);
+        compensation::lift(window, z_mm, self.every, &self.profile, &outlines);
     }
 }
 
@@ -240,10 +254,18 @@ struct Found {
 
 impl Found {
     fn see(&mut self, band: &Band) {
-        self.samples += band.heights.z_mm.iter().filter(|z_mm| !z_mm.is_nan()).count() as u64;
-        for &residual_mm in band.residual.iter().flat_map(|residual| &residual.z_mm) {
-            self.residual_max_mm = self.residual_max_mm.max(residual_mm);
-            self.cavity_samples += u64::from(residual_mm > CAVITY_MM);
+        self.samples += band.samples;
+        for some in band.residual.chunks(1 << 16) {
+            let mut most = [self.residual_max_mm; LANES];
+            let mut cavities = 0;
+            for part in some.chunks(LANES) {
+                for (most, &z) in most.iter_mut().zip(part) {
+                    *most = if z > *most { z } else { *most };
+                    cavities += u32::from(z > CAVITY_MM);
+                }
+            }
+            self.residual_max_mm = most.into_iter().fold(0.0, f32::max);
+            self.cavity_samples += u64::from(cavities);
         }
     }
 }
@@ -273,16 +295,16 @@ impl Files {
         })
     }
 
-    fn write(&mut self, band: &Band) -> Result<(), Refusal> {
-        let write = |to: &mut Option<(String, HeightWriter)>, heights: Option<&Heights>| {
-            if let (Some((_, writer)), Some(heights)) = (to, heights) {
-                writer.write(heights)?;
+    fn write(&mut self, band: &Band, columns: usize) -> Result<(), Refusal> {
+        let write = |to: &mut Option<(String, HeightWriter)>, z_mm: &[f32]| {
+            if let Some((_, writer)) = to {
+                writer.write_rows(columns, z_mm)?;
             }
             Ok::<(), Refusal>(())
         };
-        write(&mut self.cl, Some(&band.cl))?;
-        write(&mut self.closing, band.closing.as_ref())?;
-        write(&mut self.residual, band.residual.as_ref())
+        write(&mut self.cl, &band.cl)?;
+        write(&mut self.closing, &band.closing)?;
+        write(&mut self.residual, &band.residual)
     }
 
     fn finish(self) -> Result<Vec<String>, Refusal> {

@@ -13,7 +13,7 @@
 //! the edge are left, with boxes as long as the arc over which the ball rolls around it.
 
 use super::Profile;
-use super::ball::Ball;
+use super::ball::{Ball, Reachable};
 use super::blocks::{Block, Lanes, ROWS, measure};
 use super::cones::Cones;
 use super::feed::Feed;
@@ -78,7 +78,7 @@ pub(super) struct On<'a, P: Pairs> {
 widest! {
     /// Raises the targets by every sample of the field that can touch a ball there, or sets
     /// `given_up` because it is more work than `most`, in groups of lanes.
-    fn contacts<P: Pairs>(field: &mut Field, pairs: &P, profile: &Profile, out: &mut Targets, feed: Option<&mut Feed<'_, '_>>, most: f64, given_up: &mut bool) = body
+    fn contacts<P: Pairs>(field: &mut Field, pairs: &P, profile: &Profile, out: &mut Targets, fed: Option<(&mut Feed<'_, '_>, &mut Progress<Reachable>)>, most: f64, given_up: &mut bool) = body
 }
 
 #[inline(always)]
@@ -87,7 +87,7 @@ pub(super) fn body<V: Vectors, P: Pairs>(
     pairs: &P,
     profile: &Profile,
     out: &mut Targets,
-    feed: Option<&mut Feed<'_, '_>>,
+    fed: Option<(&mut Feed<'_, '_>, &mut Progress<Reachable>)>,
     most: f64,
     given_up: &mut bool,
 ) {
@@ -97,12 +97,15 @@ pub(super) fn body<V: Vectors, P: Pairs>(
         return;
     }
     let rolling = Rolling::<V>::new(ball, pairs.is_whole());
-    *given_up = !search::<V, P, _>(rolling, profile, field, pairs, out, feed, most);
+    *given_up = match fed {
+        Some((feed, progress)) => !search(rolling, profile, field, pairs, out, Some(feed), progress, most),
+        None => !search(rolling, profile, field, pairs, out, None, &mut Progress::new(), most),
+    };
 }
 
 widest! {
     /// As [`contacts`], of any cutter on samples, by a table; the samples under its flat bottom are left out.
-    fn contacts_by_table<P: Pairs>(field: &mut Field, pairs: &P, cones: &Cones, out: &mut Targets, feed: Option<&mut Feed<'_, '_>>, most: f64, given_up: &mut bool) = body_by_table
+    fn contacts_by_table<P: Pairs>(field: &mut Field, pairs: &P, cones: &Cones, out: &mut Targets, most: f64, given_up: &mut bool) = body_by_table
 }
 
 #[inline(always)]
@@ -111,15 +114,16 @@ pub(super) fn body_by_table<V: Vectors, P: Pairs>(
     pairs: &P,
     cones: &Cones,
     out: &mut Targets,
-    feed: Option<&mut Feed<'_, '_>>,
     most: f64,
     given_up: &mut bool,
 ) {
-    *given_up = !search::<V, P, _>(Listed::<V>::new(cones), &cones.profile, field, pairs, out, feed, most);
+    let (listed, progress) = (Listed::<V>::new(cones), &mut Progress::new());
+    *given_up = !search(listed, &cones.profile, field, pairs, out, None, progress, most);
 }
 
-/// False if it was given up.
+/// False if it was given up; where it stands then tells nothing.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)]
 fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
     touch: T,
     profile: &Profile,
@@ -127,10 +131,14 @@ fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
     pairs: &P,
     out: &mut Targets,
     mut feed: Option<&mut Feed<'_, '_>>,
+    progress: &mut Progress<T::At>,
     most: f64,
 ) -> bool {
-    let none = Known { rises: Rises::NO_SAMPLE, at: touch.nowhere() };
-    let known = vec![[none; 2]; field.columns.div_ceil(LANES) + 1];
+    let mut known = std::mem::take(&mut progress.known);
+    if known.is_empty() {
+        let none = Known { rises: Rises::NO_SAMPLE, at: touch.nowhere() };
+        known.resize(field.columns.div_ceil(LANES) + 1, [none; 2]);
+    }
     let radius = profile.radius();
     let mut search = Search::<V, P, T> {
         field,
@@ -144,10 +152,20 @@ fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
         vectors: PhantomData,
     };
     let rows = search.field.rows;
-    for a in (0..rows).step_by(ROWS) {
+    let start = progress.next;
+    let end = feed.as_ref().map_or(rows as i64, |feed| feed.end_row()) as f64 - start as f64;
+    // Samples before the first target raise few.
+    let lead = if start == 0 { radius } else { 0.0 };
+    if let Some(feed) = &mut feed {
+        feed.after(start as i64, out);
+    }
+    for a in (start..rows).step_by(ROWS) {
+        if feed.as_ref().is_some_and(|feed| feed.is_done()) {
+            *progress = Progress { next: a, known: search.known };
+            return true;
+        }
         let count = ROWS.min(rows - a);
-        // Samples before the first target raise few.
-        let part = (((a + count) as f64 - radius) / (rows as f64 - 2.0 * radius)).clamp(0.0, 1.0);
+        let part = (((a + count - start) as f64 - lead) / (end - 2.0 * lead)).clamp(0.0, 1.0);
         search.most = (part + ALLOWANCE) * most;
         if let Some(feed) = &mut feed {
             feed.before(a as i64, count, search.field, out);
@@ -163,7 +181,20 @@ fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
     if let Some(feed) = &mut feed {
         feed.end(out);
     }
+    *progress = Progress { next: rows, known: search.known };
     true
+}
+
+/// How far a field was looked through: the next row, and what is known from those before.
+pub(super) struct Progress<At> {
+    next: usize,
+    known: Vec<[Known<At>; 2]>,
+}
+
+impl<At> Progress<At> {
+    pub fn new() -> Progress<At> {
+        Progress { next: 0, known: Vec::new() }
+    }
 }
 
 /// The few offsets of some rises, kept because the next block is likely to lie on the same facet.

@@ -10,7 +10,7 @@ use super::meridian::Meridian;
 use super::ridges::{down, up};
 use super::touch::{Band, Rest, Stretch};
 use super::{Profile, RowTarget};
-use crate::grid::Heights;
+use crate::grid::Window;
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
@@ -28,19 +28,24 @@ const MOST_MEMBERS: usize = 1 << 25;
 
 /// Raises cutter locations on samples to the exact drop on convex faces: `outlines_mm` are their
 /// corners, counter-clockwise seen from above, in the frame of the samples and with their datum.
-/// Row k of `cl` stands at row `cl.window.row + k every` of the samples.
+/// Row k of `z_mm` stands at row `window.row + k every` of the samples, in the columns of `window`.
 ///
 /// What comes out is the higher of the two: never below the drop on these faces by more than
 /// the rounding to f32, and nowhere above what it was where that was higher.
-pub fn lift(cl: &mut Heights, every: usize, profile: &Profile, outlines_mm: &[Vec<[f64; 3]>]) {
-    let window = cl.window;
+pub fn lift(
+    window: Window,
+    z_mm: &mut [f32],
+    every: usize,
+    profile: &Profile,
+    outlines_mm: &[Vec<[f64; 3]>],
+) {
     let step_mm = profile.step_mm();
     if window.columns == 0 {
         return;
     }
     let facets = Facets::new(outlines_mm);
     let faces = Faces::new(&facets, profile);
-    cl.z_mm.par_chunks_mut(ROWS * window.columns).enumerate().for_each(|(chunk, z_mm)| {
+    z_mm.par_chunks_mut(ROWS * window.columns).enumerate().for_each(|(chunk, z_mm)| {
         for (k, z_mm) in z_mm.chunks_exact_mut(window.columns).enumerate() {
             let row = window.row + ((chunk * ROWS + k) * every) as i64;
             let target = RowTarget {

@@ -4,6 +4,14 @@ use super::field::{Field, Sense, Targets};
 use super::pairs::OnSamples;
 use crate::grid::{Heights, Window};
 
+/// How far a field was fed: rows taken, and targets opened and given.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fed {
+    taken: i64,
+    opened: usize,
+    given: usize,
+}
+
 /// Takes rows into a field shortly before they are looked at, and gives those targets that nothing
 /// raises any more: both stay in a core's cache however tall they are.
 pub(super) struct Feed<'a, 'b> {
@@ -14,11 +22,12 @@ pub(super) struct Feed<'a, 'b> {
     every: i64,
     /// Row of the field at whose height target 0 stands.
     level: i64,
-    /// Where the targets go.
+    /// Targets there are in all.
+    all: usize,
+    /// Where those from `first` on go.
     to: &'a mut [&'b mut [f32]],
-    taken: i64,
-    opened: usize,
-    given: usize,
+    first: usize,
+    pub fed: Fed,
 }
 
 impl<'a, 'b> Feed<'a, 'b> {
@@ -35,9 +44,34 @@ impl<'a, 'b> Feed<'a, 'b> {
         let far = FARTHEST.min(on.reach as usize) + 1;
         field.hold(input, ROWS + 2 * far);
         let columns = to.first().map_or(0, |to| to.len());
-        targets.hold(columns, to.len(), (ROWS + 2 * on.reach as usize) / on.every as usize + 2);
+        targets.hold(columns, on.target_rows, (ROWS + 2 * on.reach as usize) / on.every as usize + 2);
+        let fed = Fed { taken: -1, opened: 0, given: 0 };
+        Feed::again(h, input, sense, on, to, 0, fed)
+    }
+
+    /// Goes on where field and targets were left, at the target `first`. `h` has all rows that were not taken.
+    pub fn again(
+        h: &'a Heights,
+        input: Window,
+        sense: Sense,
+        on: &OnSamples,
+        to: &'a mut [&'b mut [f32]],
+        first: usize,
+        fed: Fed,
+    ) -> Feed<'a, 'b> {
         let level = on.target_row - on.input_row;
-        Feed { h, input, sense, reach: on.reach, every: on.every, level, to, taken: -1, opened: 0, given: 0 }
+        Feed { h, input, sense, reach: on.reach, every: on.every, level, all: on.target_rows, to, first, fed }
+    }
+
+    /// Whether all targets that are wanted are given.
+    #[inline(always)]
+    pub fn is_done(&self) -> bool {
+        self.fed.given == self.first + self.to.len()
+    }
+
+    /// The row of the field after the last one that raises a target that is wanted.
+    pub fn end_row(&self) -> i64 {
+        self.level + (self.first + self.to.len()) as i64 * self.every - self.every + self.reach + 1
     }
 
     /// Takes the samples that these rows of the field are looked at with, and opens the targets
@@ -46,20 +80,25 @@ impl<'a, 'b> Feed<'a, 'b> {
     pub fn before(&mut self, a: i64, rows: usize, field: &mut Field, targets: &mut Targets) {
         let far = FARTHEST.min(self.reach as usize) as i64 + 1;
         let end = a + rows as i64;
-        while self.taken < end + far && self.taken <= self.input.rows as i64 {
-            field.take(self.taken, self.h, self.input, self.sense);
-            self.taken += 1;
+        while self.fed.taken < end + far && self.fed.taken <= self.input.rows as i64 {
+            field.take(self.fed.taken, self.h, self.input, self.sense);
+            self.fed.taken += 1;
         }
-        while self.opened < self.to.len() && self.level + self.opened as i64 * self.every < end + self.reach {
-            targets.open(self.opened);
-            self.opened += 1;
+        while self.fed.opened < self.all
+            && self.level + self.fed.opened as i64 * self.every < end + self.reach
+        {
+            targets.open(self.fed.opened);
+            self.fed.opened += 1;
         }
     }
 
     /// Gives the targets that rows from `a` on cannot reach.
     #[inline(always)]
     pub fn after(&mut self, a: i64, targets: &mut Targets) {
-        while self.given < self.opened && self.level + (self.given as i64) * self.every + self.reach < a {
+        while self.fed.given < self.fed.opened
+            && !self.is_done()
+            && self.level + (self.fed.given as i64) * self.every + self.reach < a
+        {
             self.give(targets);
         }
     }
@@ -67,10 +106,10 @@ impl<'a, 'b> Feed<'a, 'b> {
     /// Gives all that is left.
     #[inline(always)]
     pub fn end(&mut self, targets: &mut Targets) {
-        while self.given < self.to.len() {
-            if self.given == self.opened {
-                targets.open(self.opened);
-                self.opened += 1;
+        while !self.is_done() {
+            if self.fed.given == self.fed.opened {
+                targets.open(self.fed.opened);
+                self.fed.opened += 1;
             }
             self.give(targets);
         }
@@ -78,8 +117,8 @@ impl<'a, 'b> Feed<'a, 'b> {
 
     #[inline(always)]
     fn give(&mut self, targets: &mut Targets) {
-        self.sense.give_row(self.to[self.given], targets.row(self.given));
+        self.sense.give_row(self.to[self.fed.given - self.first], targets.row(self.fed.given));
         targets.close();
-        self.given += 1;
+        self.fed.given += 1;
     }
 }

@@ -17,3 +17,13 @@ pub(super) fn large_pages(z: &[f32]) {
         }
     }
 }
+
+/// Makes so many heights of a vector that are all about to be written: what it holds stays, or else it is memory
+/// that nobody has touched yet.
+pub(super) fn untouched(z: &mut Vec<f32>, len: usize) {
+    if z.capacity() < len {
+        *z = vec![0.0; len];
+        large_pages(z);
+    }
+    z.resize(len, 0.0);
+}

@@ -43,6 +43,7 @@ mod runs;
 mod slopes;
 mod stencil;
 mod stream;
+mod strips;
 mod sweep;
 mod tables;
 mod tiles;
@@ -59,7 +60,9 @@ pub use stream::{Band, stream, stream_bytes};
 pub use tables::Tables;
 #[doc(hidden)]
 pub use tiles::{Way, cutter_location_by};
-pub use tiles::{closing, cutter_location, cutter_location_rows, cutter_location_rows_into, erode, residual};
+pub use tiles::{
+    closing, closing_by, cutter_location, cutter_location_rows, cutter_location_rows_into, erode, residual,
+};
 
 /// Why a compensation was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

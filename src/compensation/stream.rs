@@ -1,26 +1,41 @@
-use super::{Profile, RowPass, cutter_location_rows_into, erode, machined_by_rows, residual};
+use super::field::Sense;
+use super::memory::untouched;
+use super::strips::{AHEAD, Strips, in_strips, strip_bytes};
+use super::tiles::left;
+use super::{Profile, RowPass, Tables, machined_by_rows};
 use crate::grid::{Heights, Lattice, Window};
+use rayon::prelude::*;
 
 /// Samples of one band, about: what is held at once is a few bands and the cutter's reach.
 const BAND_SAMPLES: usize = 1 << 24;
 
+/// The same where no row is looked at twice.
+const STRIP_SAMPLES: usize = 1 << 23;
+
+/// Rows that one thread masks at once.
+const ROWS: usize = 16;
+
 /// Rows of one band of a whole part, and what a cutter makes of them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Band {
-    /// The part.
-    pub heights: Heights,
+    /// First row of the part, and how many.
+    pub row: usize,
+    pub rows: usize,
+    /// Samples of these rows with data.
+    pub samples: u64,
     /// Cutter locations at the rows of this band that are cut; no data where the part has none.
-    pub cl: Heights,
+    pub cl: Vec<f32>,
     /// What the cutter leaves, if it was asked for; no data where the part has none.
-    pub closing: Option<Heights>,
-    /// closing - heights.
-    pub residual: Option<Heights>,
+    pub closing: Vec<f32>,
+    /// closing less part, if it was asked for.
+    pub residual: Vec<f32>,
 }
 
 /// Compensates a whole part band by band, from the lowest row up. Rows 0, `every`, 2 `every`, ...
 /// are cut, and those beyond the part, whose edges are open; closing is made from these rows.
-/// `read` gives the part's samples in a window that may reach past it; `lift` may raise the
-/// locations it is given, as [`super::lift`] does. What comes out does not depend on the bands.
+/// `read` gives the part's samples in a window of whole rows, each row once and from the lowest up; `lift` may
+/// raise the locations it is given, as [`super::lift`] does, of rows `every` apart. What comes out does not depend
+/// on the bands. `each` may take a band if it leaves another, whose memory is then used again.
 ///
 /// # Errors
 /// Those of `read`, `lift` and `each`.
@@ -29,137 +44,221 @@ pub fn stream<E>(
     profile: &Profile,
     every: usize,
     with_closing: bool,
-    read: impl FnMut(Window) -> Result<Heights, E>,
-    lift: impl FnMut(&mut Heights) -> Result<(), E>,
-    each: impl FnMut(Band) -> Result<(), E>,
+    read: impl FnMut(Window, &mut [f32]) -> Result<(), E>,
+    lift: impl FnMut(Window, &mut [f32]) -> Result<(), E>,
+    each: impl FnMut(&mut Band) -> Result<(), E>,
 ) -> Result<(), E> {
-    by_rows(rows_at_once(lattice), lattice, profile, every, with_closing, read, lift, each)
+    let tables = Tables::new(*profile);
+    by_rows(rows_at_once(lattice, &tables), lattice, &tables, every, with_closing, read, lift, each)
 }
 
-fn rows_at_once(lattice: &Lattice) -> usize {
-    (BAND_SAMPLES / lattice.columns.max(1)).clamp(64, 1024)
+fn rows_at_once(lattice: &Lattice, tables: &Tables) -> usize {
+    let columns = lattice.columns.max(1);
+    if in_strips(tables, columns) {
+        return (STRIP_SAMPLES / columns).clamp(64, 1024);
+    }
+    (BAND_SAMPLES / columns).clamp(64, 1024)
 }
 
 /// Bytes that [`stream`] holds at once, about and rather more: by the width of the part and the
 /// cutter, whatever the part's height.
 pub fn stream_bytes(lattice: &Lattice, profile: &Profile, with_closing: bool) -> u64 {
-    let rows = rows_at_once(lattice).min(lattice.rows);
+    let tables = Tables::new(*profile);
+    let rows = rows_at_once(lattice, &tables).min(lattice.rows);
     let reach = profile.reach();
     let halo = if with_closing { reach } else { 0 };
-    let width = lattice.columns + 2 * (halo + reach);
-    // The part with its halo, the rows cut (twice while they grow), and four bands of results, with those of the
-    // band before on their way to a file.
-    let rows = rows + 2 * (halo + reach) + 2 * (rows + 2 * halo) + 8 * rows;
-    4 * width as u64 * rows as u64
+    let width = lattice.columns + 2 * halo;
+    // The part and the rows cut, with what lies around them, and two bands of results with what a file takes of one.
+    let results = if with_closing { 3 } else { 1 };
+    let rows = 2 * (rows + 2 * (halo + reach + AHEAD)) + (2 * results + 1) * rows;
+    let strips = strip_bytes(&tables, width) * if with_closing { 2 } else { 1 };
+    4 * width as u64 * rows as u64 + strips
+}
+
+/// Rows of samples that follow each other: the lowest ones go when they are no longer needed.
+struct Held {
+    heights: Heights,
+}
+
+impl Held {
+    /// None yet; the first will be the row `window.row`.
+    fn new(window: Window) -> Held {
+        Held { heights: Heights { window: Window { rows: 0, ..window }, z_mm: Vec::new() } }
+    }
+
+    fn end(&self) -> i64 {
+        self.heights.window.row_end()
+    }
+
+    /// Makes room for so many rows more, whose samples are to be written.
+    fn more(&mut self, rows: usize) -> (Window, &mut [f32]) {
+        let Heights { window, z_mm } = &mut self.heights;
+        let new = Window { row: window.row_end(), rows, ..*window };
+        let held = window.samples();
+        window.rows += rows;
+        if window.samples() > z_mm.len() {
+            if window.samples() > z_mm.capacity() {
+                let before = std::mem::take(z_mm);
+                untouched(z_mm, window.samples());
+                z_mm[..held].copy_from_slice(&before[..held]);
+            }
+            z_mm.resize(window.samples(), 0.0);
+        }
+        (new, &mut z_mm[held..][..new.samples()])
+    }
+
+    /// Lets the rows before this one go.
+    fn keep_from(&mut self, row: i64) {
+        let Heights { window, z_mm } = &mut self.heights;
+        let gone = (row - window.row).clamp(0, window.rows as i64) as usize;
+        z_mm.copy_within(gone * window.columns..window.samples(), 0);
+        window.row += gone as i64;
+        window.rows -= gone;
+    }
 }
 
 #[allow(clippy::too_many_arguments)]
 fn by_rows<E>(
     rows_at_once: usize,
     lattice: &Lattice,
-    profile: &Profile,
+    tables: &Tables,
     every: usize,
     with_closing: bool,
-    mut read: impl FnMut(Window) -> Result<Heights, E>,
-    mut lift: impl FnMut(&mut Heights) -> Result<(), E>,
-    mut each: impl FnMut(Band) -> Result<(), E>,
+    mut read: impl FnMut(Window, &mut [f32]) -> Result<(), E>,
+    mut lift: impl FnMut(Window, &mut [f32]) -> Result<(), E>,
+    mut each: impl FnMut(&mut Band) -> Result<(), E>,
 ) -> Result<(), E> {
     let every = every.max(1);
-    let reach = profile.reach();
+    let reach = tables.profile().reach();
     let part = lattice.window();
     let halo = if with_closing { reach } else { 0 };
     let rows_at_once = rows_at_once.next_multiple_of(every);
-    // Rows of positions that are held, one in `every`, and the part's row of the first.
-    let mut cut = Heights::empty(Window { columns: part.columns + 2 * halo, rows: 0, ..part.grown(halo) });
-    let mut first = -((halo / every * every) as i64);
-    let mut more = Heights::empty(Window { columns: 0, rows: 0, ..part });
-    for start in (0..part.rows).step_by(rows_at_once) {
-        let band = Window { row: start as i64, rows: rows_at_once.min(part.rows - start), ..part };
-        // Cut rows that this band needs beyond those held.
-        let from = first + (cut.window.rows * every) as i64;
-        let end = band.row_end() + halo as i64;
-        let wanted = Window {
-            column: cut.window.column,
-            columns: cut.window.columns,
-            row: from,
-            rows: (end - from).max(0) as usize,
+    let mut h = Held::new(part);
+    // Positions that are held: row k of these is the part's row k `every`.
+    let lowest = -((halo / every) as i64);
+    let positions = Window { row: lowest, columns: part.columns + 2 * halo, ..part.grown(halo) };
+    let mut cut = Held::new(positions);
+    let all =
+        Window { row: lowest * every as i64, rows: part.rows + halo + halo / every * every, ..positions };
+    let mut locations = Strips::new(tables, all, every, Sense::Raise);
+    let mut closings = Strips::new(tables, part, 1, Sense::Lower);
+    let mut band = Band::default();
+    for row in (0..part.rows).step_by(rows_at_once) {
+        (band.row, band.rows) = (row, rows_at_once.min(part.rows - row));
+        let end = (row + band.rows) as i64;
+        // Positions that closing looks at, and samples that these look at.
+        let beyond = if with_closing { halo + AHEAD } else { 0 } as i64;
+        let cut_end = (end + beyond).min(all.row_end());
+        let rows = ((cut_end - 1).div_euclid(every as i64) + 1 - cut.end()).max(0) as usize;
+        let h_end = (cut_end + (reach + AHEAD) as i64).min(part.row_end());
+        let (window, z_mm) = h.more((h_end - h.end()).max(0) as usize);
+        read(window, z_mm)?;
+
+        let (new, z_mm) = if with_closing {
+            cut.more(rows)
+        } else {
+            untouched(&mut band.cl, rows * part.columns);
+            let new = Window { row: cut.end(), rows, ..part };
+            cut.heights.window.row += rows as i64;
+            (new, band.cl.as_mut_slice())
         };
-        let around = wanted.grown(reach);
-        let low = around.row.min(band.row);
-        let high = around.row_end().max(band.row_end());
-        let h = read(Window { row: low, rows: (high - low) as usize, ..around })?;
-        cutter_location_rows_into(&h, profile, wanted, every, &mut more);
-        lift(&mut more)?;
-        cut.z_mm.extend_from_slice(&more.z_mm);
-        cut.window.rows += more.window.rows;
-
-        let heights = h.crop(band);
-        drop(h);
-        let cl = those_of_band(&cut, first, every, &band, &heights);
-        let closing = with_closing.then(|| {
-            let mut closing = if every == 1 {
-                // Row numbers are right as long as every row is held.
-                let window = Window { row: first, ..cut.window };
-                let held = Heights { window, z_mm: std::mem::take(&mut cut.z_mm) };
-                let closing = erode(&held, profile, band);
-                cut.z_mm = held.z_mm;
-                closing
+        let new = Window { row: new.row * every as i64, ..new };
+        locations.rows(&h.heights, new.row, z_mm);
+        lift(new, z_mm)?;
+        if with_closing {
+            of_part(&cut.heights, every, &part, &mut band);
+            untouched(&mut band.closing, band.rows * part.columns);
+            if every == 1 {
+                closings.rows(&cut.heights, row as i64, &mut band.closing);
             } else {
-                let passes: Vec<RowPass> = cut
-                    .z_mm
-                    .chunks_exact(cut.window.columns)
-                    .enumerate()
-                    .map(|(k, z_mm)| RowPass {
-                        x0_mm: lattice.x_mm(cut.window.column),
-                        y_mm: lattice.y_mm(first + (k * every) as i64),
-                        z_mm,
-                    })
-                    .collect();
-                machined_by_rows(&passes, profile, band)
-            };
-            mask(&mut closing.z_mm, &heights.z_mm);
-            closing
-        });
-        let residual = closing.as_ref().map(|closing| residual(closing, &heights));
-        each(Band { heights, cl, closing, residual })?;
+                under_rows(&cut.heights, every, lattice, tables.profile(), &mut band);
+            }
+        }
+        finish(&h.heights, every, with_closing, &mut band);
+        each(&mut band)?;
 
-        // The next band needs the rows within reach of its first.
-        let keep = band.row_end() - halo as i64;
-        let gone = ((keep - first).max(0) as usize / every).min(cut.window.rows);
-        cut.z_mm.drain(..gone * cut.window.columns);
-        cut.window.rows -= gone;
-        first += (gone * every) as i64;
+        // The next band looks at the rows within reach of its first.
+        cut.keep_from((end - halo as i64).div_euclid(every as i64));
+        h.keep_from((cut.end() * every as i64).min(end) - reach as i64);
     }
     Ok(())
 }
 
-/// The cut rows that lie in the band, over the part's columns.
-fn those_of_band(cut: &Heights, first: i64, every: usize, band: &Window, heights: &Heights) -> Heights {
-    let rows = band.rows.div_ceil(every);
-    let mut cl = Heights { window: Window { rows, ..*band }, z_mm: Vec::with_capacity(rows * band.columns) };
-    for row in (band.row..band.row_end()).step_by(every) {
-        let k = (row - first) as usize / every;
-        let from = k * cut.window.columns + (band.column - cut.window.column) as usize;
-        let start = cl.z_mm.len();
-        cl.z_mm.extend_from_slice(&cut.z_mm[from..][..band.columns]);
-        mask(&mut cl.z_mm[start..], heights.row(row));
+/// The locations at the band's rows that are cut, over the part's columns.
+fn of_part(cut: &Heights, every: usize, part: &Window, band: &mut Band) {
+    let columns = part.columns;
+    untouched(&mut band.cl, band.rows.div_ceil(every) * columns);
+    let first = (band.row / every) as i64;
+    let beside = (part.column - cut.window.column) as usize;
+    band.cl.par_chunks_mut(ROWS * columns).enumerate().for_each(|(chunk, cl)| {
+        for (k, cl) in cl.chunks_exact_mut(columns).enumerate() {
+            let row = first + (chunk * ROWS + k) as i64;
+            cl.copy_from_slice(&cut.row(row)[beside..][..columns]);
+        }
+    });
+}
+
+/// What rows `every` apart leave.
+fn under_rows(cut: &Heights, every: usize, lattice: &Lattice, profile: &Profile, band: &mut Band) {
+    let passes: Vec<RowPass> = (cut.window.row..cut.window.row_end())
+        .map(|row| RowPass {
+            x0_mm: lattice.x_mm(cut.window.column),
+            y_mm: lattice.y_mm(row * every as i64),
+            z_mm: cut.row(row),
+        })
+        .collect();
+    let window = Window { row: band.row as i64, rows: band.rows, ..lattice.window() };
+    band.closing = machined_by_rows(&passes, profile, window).z_mm;
+}
+
+/// No data where the part has none, what is left, and how many samples there are.
+fn finish(h: &Heights, every: usize, with_closing: bool, band: &mut Band) {
+    let columns = h.window.columns;
+    let Band { row, rows, samples, cl, closing, residual } = band;
+    let first = *row;
+    let samples_of = |z: &[f32]| z.iter().map(|z| u32::from(!z.is_nan())).sum::<u32>() as u64;
+    let row_of = |chunk: usize, k: usize| h.row((first + chunk * ROWS + k) as i64);
+    cl.par_chunks_mut(ROWS * columns).enumerate().for_each(|(chunk, cl)| {
+        for (k, cl) in cl.chunks_exact_mut(columns).enumerate() {
+            mask(cl, h.row((first + (chunk * ROWS + k) * every) as i64));
+        }
+    });
+    if !with_closing {
+        let counts = (0..*rows).into_par_iter().with_min_len(ROWS);
+        *samples = counts.map(|k| samples_of(h.row((first + k) as i64))).sum();
+        return;
     }
-    cl
+    untouched(residual, *rows * columns);
+    let chunks = closing.par_chunks_mut(ROWS * columns).zip(residual.par_chunks_mut(ROWS * columns));
+    *samples = chunks
+        .enumerate()
+        .map(|(chunk, (closing, residual))| {
+            let mut samples = 0;
+            let rows = closing.chunks_exact_mut(columns).zip(residual.chunks_exact_mut(columns));
+            for (k, (closing, residual)) in rows.enumerate() {
+                let h = row_of(chunk, k);
+                samples += samples_of(h);
+                mask(closing, h);
+                for ((residual, closing), h) in residual.iter_mut().zip(closing.iter()).zip(h) {
+                    *residual = left(*closing, *h);
+                }
+            }
+            samples
+        })
+        .sum();
 }
 
 /// No data where the part has none.
 fn mask(z_mm: &mut [f32], part: &[f32]) {
     for (z_mm, part) in z_mm.iter_mut().zip(part) {
-        if part.is_nan() {
-            *z_mm = f32::NAN;
-        }
+        *z_mm = if part.is_nan() { f32::NAN } else { *z_mm };
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compensation::{closing, cutter_location};
+    use crate::compensation::{closing, cutter_location, erode};
     use std::convert::Infallible;
 
     /// Waves with a hole.
@@ -180,15 +279,19 @@ mod tests {
         let (lattice, h) = part();
         let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
         let mut out = [Vec::new(), Vec::new(), Vec::new()];
-        let each = |band: Band| {
-            let parts = [Some(&band.cl), band.closing.as_ref(), band.residual.as_ref()];
-            for (out, heights) in out.iter_mut().zip(parts) {
-                out.extend(heights.expect("asked for").z_mm.iter().map(|z| z.to_bits()));
+        let each = |band: &mut Band| {
+            let Band { cl, closing, residual, .. } = std::mem::take(band);
+            for (out, z_mm) in out.iter_mut().zip([cl, closing, residual]) {
+                out.extend(z_mm.iter().map(|z| z.to_bits()));
             }
             Ok::<(), Infallible>(())
         };
-        let done =
-            by_rows(rows_at_once, &lattice, &profile, every, true, |w| Ok(h.crop(w)), |_| Ok(()), each);
+        let read = |window, z_mm: &mut [f32]| {
+            z_mm.copy_from_slice(&h.crop(window).z_mm);
+            Ok(())
+        };
+        let tables = Tables::new(profile);
+        let done = by_rows(rows_at_once, &lattice, &tables, every, true, read, |_, _| Ok(()), each);
         assert!(done.is_ok());
         out
     }

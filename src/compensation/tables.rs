@@ -1,25 +1,40 @@
 use super::Profile;
+use super::cones::Cones;
 use super::stencil::Stencil;
-use std::sync::{Arc, Mutex, PoisonError};
+use super::tiles::has_chords;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Bytes of tables that are kept; past that all are made anew.
 const MOST_BYTES: usize = 1 << 26;
 
-/// A cutter with its tables for rows at any place between the samples, each made once: a row's distances from
-/// the samples depend on its offset from them alone.
+/// A cutter with its tables for positions on samples and for rows at any place between them, each made once: a
+/// row's distances from the samples depend on its offset from them alone.
 #[derive(Debug)]
 pub struct Tables {
     profile: Profile,
     made: Mutex<Vec<Arc<Stencil>>>,
+    on_samples: OnceLock<Stencil>,
+    cones: OnceLock<Cones>,
 }
 
 impl Tables {
     pub fn new(profile: Profile) -> Tables {
-        Tables { profile, made: Mutex::default() }
+        Tables { profile, made: Mutex::default(), on_samples: OnceLock::new(), cones: OnceLock::new() }
     }
 
     pub fn profile(&self) -> &Profile {
         &self.profile
+    }
+
+    /// The table for positions on samples.
+    pub(super) fn on_samples(&self) -> &Stencil {
+        self.on_samples.get_or_init(|| Stencil::new(&self.profile, 0.0, 0.0))
+    }
+
+    /// Where samples can touch it, for positions on samples.
+    pub(super) fn cones(&self) -> &Cones {
+        let cones = || Cones::new(&self.profile, self.on_samples(), has_chords(&self.profile));
+        self.cones.get_or_init(cones)
     }
 
     /// The table for samples at whole pitches and (fx, fy) from the axis.

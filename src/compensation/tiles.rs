@@ -1,11 +1,13 @@
+use super::ball::Reachable;
 use super::cones::Cones;
-use super::feed::Feed;
+use super::contact::Progress;
+use super::feed::{Fed, Feed};
 use super::field::{Field, Sense, Targets};
 use super::lanes::LANES;
-use super::memory::large_pages;
+use super::memory::untouched;
 use super::pairs::{OnSamples, Pairs};
 use super::stencil::Stencil;
-use super::{Profile, bounded, brute, chord, contact};
+use super::{Profile, Tables, bounded, brute, chord, contact};
 use crate::grid::{Heights, Window};
 use rayon::prelude::*;
 
@@ -33,13 +35,13 @@ const LISTED_PART: f64 = 0.03;
 /// Cutter locations at the samples of `out`, which may reach past the part: the lowest z of the
 /// cutter's lowest point at which it does not cut into `h`. NaN where no data is in reach.
 pub fn cutter_location(h: &Heights, profile: &Profile, out: Window) -> Heights {
-    on_samples(h, profile, out, 1, Sense::Raise, Way::Known)
+    on_samples(h, &Tables::new(*profile), out, 1, Sense::Raise, Way::Known)
 }
 
 /// [`cutter_location`] by one way only, for benches: all give the same bits.
 #[doc(hidden)]
 pub fn cutter_location_by(h: &Heights, profile: &Profile, out: Window, way: Way) -> Heights {
-    on_samples(h, profile, out, 1, Sense::Raise, way)
+    on_samples(h, &Tables::new(*profile), out, 1, Sense::Raise, way)
 }
 
 /// As [`cutter_location`], at the rows `out.row`, `out.row + every`, ... of `out` only: the k-th
@@ -47,7 +49,7 @@ pub fn cutter_location_by(h: &Heights, profile: &Profile, out: Window, way: Way)
 ///
 /// `every` is at least 1.
 pub fn cutter_location_rows(h: &Heights, profile: &Profile, out: Window, every: usize) -> Heights {
-    on_samples(h, profile, out, every.max(1), Sense::Raise, Way::Known)
+    on_samples(h, &Tables::new(*profile), out, every.max(1), Sense::Raise, Way::Known)
 }
 
 /// As [`cutter_location_rows`], in the memory that `done` has: taking some anew, and giving it back,
@@ -59,44 +61,60 @@ pub fn cutter_location_rows_into(
     every: usize,
     done: &mut Heights,
 ) {
-    on_samples_into(h, profile, out, every.max(1), Sense::Raise, Way::Known, done);
+    on_samples_into(h, &Tables::new(*profile), out, every.max(1), Sense::Raise, Way::Known, done);
 }
 
 /// What a cutter standing at the locations `cl` (NaN: it does not stand there) leaves of a stock
 /// without top: min over |d| <= R of cl(x + d) - s(d), NaN where no position reaches.
 pub fn erode(cl: &Heights, profile: &Profile, out: Window) -> Heights {
-    on_samples(cl, profile, out, 1, Sense::Lower, Way::Known)
+    on_samples(cl, &Tables::new(*profile), out, 1, Sense::Lower, Way::Known)
 }
 
 /// What the cutter leaves of `h` at best. Cutter positions are the samples of `out` grown by
 /// [`Profile::reach`], whether `h` has data there or not, so `h` should cover `out` grown by
 /// twice that as far as there is data.
 pub fn closing(h: &Heights, profile: &Profile, out: Window) -> Heights {
-    erode(&cutter_location(h, profile, out.grown(profile.reach())), profile, out)
+    closing_by(h, &Tables::new(*profile), out)
+}
+
+/// [`closing`] with tables that last longer than a call.
+pub fn closing_by(h: &Heights, tables: &Tables, out: Window) -> Heights {
+    let around = out.grown(tables.profile().reach());
+    let cl = on_samples(h, tables, around, 1, Sense::Raise, Way::Known);
+    on_samples(&cl, tables, out, 1, Sense::Lower, Way::Known)
 }
 
 /// closing - h, never negative: rounding may put a closing one unit in the last place low. NaN
 /// where either has no data. Both have the window of `closing`.
 pub fn residual(closing: &Heights, h: &Heights) -> Heights {
-    let h = if h.window == closing.window { h.clone() } else { h.crop(closing.window) };
-    let z_mm = closing
-        .z_mm
-        .iter()
-        .zip(&h.z_mm)
-        .map(|(c, h)| if c.is_nan() || h.is_nan() { f32::NAN } else { (c - h).max(0.0) })
-        .collect();
+    let cropped;
+    let h = if h.window == closing.window {
+        h
+    } else {
+        cropped = h.crop(closing.window);
+        &cropped
+    };
+    let z_mm = closing.z_mm.iter().zip(&h.z_mm).map(|(c, h)| left(*c, *h)).collect();
     Heights { window: closing.window, z_mm }
 }
 
-fn on_samples(h: &Heights, profile: &Profile, out: Window, every: usize, sense: Sense, way: Way) -> Heights {
+/// What a closing leaves on a sample.
+#[inline(always)]
+pub(super) fn left(closing_mm: f32, h_mm: f32) -> f32 {
+    let left_mm = closing_mm - h_mm;
+    // Not below zero, and NaN where either is none.
+    if left_mm < 0.0 { 0.0 } else { left_mm }
+}
+
+fn on_samples(h: &Heights, tables: &Tables, out: Window, every: usize, sense: Sense, way: Way) -> Heights {
     let mut done = Heights { window: out, z_mm: Vec::new() };
-    on_samples_into(h, profile, out, every, sense, way, &mut done);
+    on_samples_into(h, tables, out, every, sense, way, &mut done);
     done
 }
 
 fn on_samples_into(
     h: &Heights,
-    profile: &Profile,
+    tables: &Tables,
     out: Window,
     every: usize,
     sense: Sense,
@@ -105,20 +123,27 @@ fn on_samples_into(
 ) {
     let rows = out.rows.div_ceil(every);
     done.window = Window { rows, ..out };
-    // Every sample is written below; zeros are memory that nobody has touched yet.
-    let samples = rows * out.columns;
-    if done.z_mm.capacity() < samples {
-        done.z_mm = vec![0.0; samples];
-        large_pages(&done.z_mm);
-    }
-    done.z_mm.resize(samples, 0.0);
-    if samples == 0 {
+    // Every sample is written below.
+    untouched(&mut done.z_mm, rows * out.columns);
+    on_tiles(h, tables, out, every, sense, way, &mut done.z_mm);
+}
+
+/// Work on the samples of `out`, every `every`-th row, tile by tile.
+pub(super) fn on_tiles(
+    h: &Heights,
+    tables: &Tables,
+    out: Window,
+    every: usize,
+    sense: Sense,
+    way: Way,
+    done: &mut [f32],
+) {
+    if done.is_empty() {
         return;
     }
-    let stencil = Stencil::new(profile, 0.0, 0.0);
-    let columns = out.columns;
-    // All about as wide, so that threads have equal shares.
-    let width = columns.div_ceil(columns.div_ceil(TILE_COLUMNS)).next_multiple_of(LANES);
+    let profile = tables.profile();
+    let (rows, columns) = (out.rows.div_ceil(every), out.columns);
+    let width = strip_columns(columns);
     let across = columns.div_ceil(width);
     let least = TILE_ROWS[0].max(4 * profile.reach());
     let share = (out.rows * across).div_ceil(2 * rayon::current_num_threads());
@@ -126,13 +151,12 @@ fn on_samples_into(
     // Tile by tile, its rows of what is done.
     let mut tiles: Vec<Vec<&mut [f32]>> = Vec::new();
     tiles.resize_with(rows.div_ceil(tile_rows) * across, Vec::new);
-    for (row, z_mm) in done.z_mm.chunks_exact_mut(columns).enumerate() {
+    for (row, z_mm) in done.chunks_exact_mut(columns).enumerate() {
         for (column, z_mm) in z_mm.chunks_mut(width).enumerate() {
             tiles[row / tile_rows * across + column].push(z_mm);
         }
     }
-    let cones = has_table(profile, way).then(|| Cones::new(profile, &stencil, has_chords(profile)));
-    let of = OnTile { h, profile, stencil: &stencil, cones: cones.as_ref(), every: every as i64, sense, way };
+    let of = OnTile::new(h, tables, every, sense, way);
     let scratch = || (Field::empty(0, 0), Targets::new(0, 0));
     tiles.into_par_iter().with_max_len(1).enumerate().for_each_init(scratch, |scratch, (k, mut to)| {
         let tile = Window {
@@ -145,8 +169,13 @@ fn on_samples_into(
     });
 }
 
+/// Columns of one tile: all about as wide, so that threads have equal shares.
+pub(super) fn strip_columns(columns: usize) -> usize {
+    columns.div_ceil(columns.div_ceil(TILE_COLUMNS)).next_multiple_of(LANES)
+}
+
 /// What is to be done on each tile: `tile.rows` rows, `every` apart.
-struct OnTile<'a> {
+pub(super) struct OnTile<'a> {
     h: &'a Heights,
     profile: &'a Profile,
     stencil: &'a Stencil,
@@ -156,18 +185,65 @@ struct OnTile<'a> {
     way: Way,
 }
 
-impl OnTile<'_> {
+/// How a search over the rows of a strip goes on from one band to the next.
+pub(super) struct Going {
+    /// Where it began.
+    row: i64,
+    fed: Fed,
+    progress: Progress<Reachable>,
+}
+
+impl<'a> OnTile<'a> {
+    pub fn new(h: &'a Heights, tables: &'a Tables, every: usize, sense: Sense, way: Way) -> OnTile<'a> {
+        let profile = tables.profile();
+        let cones = has_table(profile, way).then(|| tables.cones());
+        OnTile { h, profile, stencil: tables.on_samples(), cones, every: every as i64, sense, way }
+    }
+
     fn dilate(&self, tile: Window, to: &mut [&mut [f32]], (field, targets): &mut (Field, Targets)) {
         if is_searched(self.profile, self.way) {
             let (input, pairs) = self.pairs(tile);
-            let most = self.most(tile);
-            let mut given_up = false;
             let mut feed = Feed::new(self.h, input, self.sense, &pairs, to, field, targets);
-            contact::contacts(field, &pairs, self.profile, targets, Some(&mut feed), most, &mut given_up);
+            let (fed, most) = (Some((&mut feed, &mut Progress::new())), self.most(tile));
+            let mut given_up = false;
+            contact::contacts(field, &pairs, self.profile, targets, fed, most, &mut given_up);
             if !given_up {
                 return;
             }
         }
+        self.without_search(tile, to, field, targets);
+    }
+
+    /// As [`OnTile::dilate`] with a search that goes on upwards where it stopped, at most up to the row `end`.
+    pub fn go_on(
+        &self,
+        tile: Window,
+        end: i64,
+        to: &mut [&mut [f32]],
+        (field, targets): &mut (Field, Targets),
+        going: &mut Option<Going>,
+    ) {
+        let row = going.as_ref().map_or(tile.row, |going| going.row);
+        let rows = ((end - row) as usize).div_ceil(self.every as usize);
+        let (input, pairs) = self.pairs(Window { row, rows, ..tile });
+        let first = ((tile.row - row) / self.every) as usize;
+        let (mut feed, mut progress) = match going.take() {
+            None => (Feed::new(self.h, input, self.sense, &pairs, to, field, targets), Progress::new()),
+            Some(Going { fed, progress, .. }) => {
+                (Feed::again(self.h, input, self.sense, &pairs, to, first, fed), progress)
+            }
+        };
+        let mut given_up = false;
+        let fed = Some((&mut feed, &mut progress));
+        contact::contacts(field, &pairs, self.profile, targets, fed, self.most(tile), &mut given_up);
+        if given_up {
+            self.without_search(tile, to, field, targets);
+        } else {
+            *going = Some(Going { row, fed: feed.fed, progress });
+        }
+    }
+
+    fn without_search(&self, tile: Window, to: &mut [&mut [f32]], field: &mut Field, targets: &mut Targets) {
         let at_once = WHOLE_ROWS.max(2 * self.profile.reach()).div_ceil(self.every as usize);
         for (k, to) in to.chunks_mut(at_once).enumerate() {
             let row = tile.row + (k * at_once) as i64 * self.every;
@@ -226,12 +302,12 @@ pub enum Way {
 }
 
 /// Whether contacts are looked for.
-fn is_searched(profile: &Profile, way: Way) -> bool {
+pub(super) fn is_searched(profile: &Profile, way: Way) -> bool {
     profile.is_ball() && profile.radius() >= LEAST_SEARCH && way != Way::EveryTap
 }
 
 /// Whether a flat bottom is taken chord by chord.
-fn has_chords(profile: &Profile) -> bool {
+pub(super) fn has_chords(profile: &Profile) -> bool {
     profile.plateau_mm() / profile.step_mm() >= LEAST_CHORD
 }
 
@@ -280,7 +356,7 @@ fn without_search<P: Pairs>(
             }
         };
         let mut given_up = false;
-        contact::contacts_by_table(field, pairs, cones, targets, None, most, &mut given_up);
+        contact::contacts_by_table(field, pairs, cones, targets, most, &mut given_up);
         if !given_up {
             return;
         }
@@ -296,7 +372,7 @@ fn without_search<P: Pairs>(
 #[cfg(test)]
 #[allow(dead_code)]
 #[path = "../../tests/compensation/surfaces.rs"]
-mod surfaces;
+pub(super) mod surfaces;
 
 #[cfg(test)]
 mod tests {
@@ -370,7 +446,7 @@ mod tests {
             }
             if profile.plateau_mm() < profile.radius_mm() {
                 let (field, most) = (&mut searched, f64::INFINITY);
-                contact::body_by_table::<V, _>(field, &pairs, &cones, targets, None, most, &mut false);
+                contact::body_by_table::<V, _>(field, &pairs, &cones, targets, most, &mut false);
             }
         });
         [every_tap, pruned, listed]

@@ -13,7 +13,7 @@ use super::part::Part;
 use super::plan::TileSetup;
 use super::shop::Shop;
 use super::{Error, WITHIN, maps};
-use crate::compensation::{self, Profile};
+use crate::compensation::{self, Tables};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{self, Layers, Tally};
 use crate::grid::{Heights, Window};
@@ -65,7 +65,7 @@ pub struct Checked {
 /// One cutter under test.
 struct Candidate<'a> {
     tool: &'a Tool,
-    profile: Profile,
+    tables: Tables,
     refused: Option<String>,
 }
 
@@ -156,7 +156,7 @@ fn candidates<'a>(job: &Job, shop: &'a Shop, tiles: &[TileSetup]) -> Result<Vec<
         let reach = tool.check_reach(depth_mm).err().map(|refusal| refusal.to_string());
         let machine = shop.machine.run(tool).err().map(|refusal| refusal.to_string());
         let profile = distinct(std::iter::once(tool.shape), job.part.step_mm)?.remove(0);
-        candidates.push(Candidate { tool, profile, refused: reach.or(machine) });
+        candidates.push(Candidate { tool, tables: Tables::new(profile), refused: reach.or(machine) });
     }
     // The finest cutters decide, so they are the ones to keep where there are too many.
     candidates.sort_by(|a, b| a.tool.shape.radius_mm().total_cmp(&b.tool.shape.radius_mm()));
@@ -272,7 +272,8 @@ impl Facts<'_> {
         let surface = tile.surface();
         let step_mm = self.job.part.step_mm;
         let limit_mm = self.job.limits.deviation_or_default_mm() as f32;
-        let reach = sets.iter().flatten().map(|&i| self.candidates[i].profile.reach()).max().unwrap_or(0);
+        let reach =
+            sets.iter().flatten().map(|&i| self.candidates[i].tables.profile().reach()).max().unwrap_or(0);
         // Normals need one sample around the block, rays as many as `light` gives them.
         let halo = if sight.is_some() { light::halo(step_mm) } else { 1 };
         let near = window.grown(halo);
@@ -319,7 +320,7 @@ impl Facts<'_> {
     fn closing(&self, around: &Heights, set: &[usize], out: Window) -> Heights {
         let mut lowest = Heights::empty(out);
         for &index in set {
-            let closing = compensation::closing(around, &self.candidates[index].profile, out);
+            let closing = compensation::closing_by(around, &self.candidates[index].tables, out);
             for (z, other) in lowest.z_mm.iter_mut().zip(&closing.z_mm) {
                 *z = z.min(*other);
             }
@@ -375,7 +376,7 @@ impl Facts<'_> {
             let surface = tile.surface();
             let lattice = surface.lattice();
             let mut map = maps::CavityMap::create(out, &tile.setup.tile.name, &lattice, self.job.maps.full)?;
-            let reach = set.iter().map(|&i| self.candidates[i].profile.reach()).max().unwrap_or(0);
+            let reach = set.iter().map(|&i| self.candidates[i].tables.profile().reach()).max().unwrap_or(0);
             for row in blocks(&lattice) {
                 let done: Vec<(Heights, Heights)> = row
                     .par_iter()

@@ -211,16 +211,23 @@ impl HeightImage {
     }
 
     fn sample(&self, xs: &[f64], window: Window, datum_mm: f64) -> Result<Heights, Error> {
-        let mut heights = Heights::empty(window);
+        let mut heights = Heights { window, z_mm: vec![0.0; window.samples()] };
+        self.sample_onto(xs, window, datum_mm, &mut heights.z_mm)?;
+        Ok(heights)
+    }
+
+    fn sample_onto(&self, xs: &[f64], window: Window, datum_mm: f64, z_mm: &mut [f32]) -> Result<(), Error> {
         let (columns, rows) = (self.raw.layout.columns, self.raw.layout.rows);
         let places: Vec<_> = xs.iter().map(|&x| self.between(x, columns)).collect();
         let inside = || places.iter().flatten();
         let (Some(first), Some(last)) = (inside().map(|p| p.0).min(), inside().map(|p| p.0).max()) else {
-            return Ok(heights);
+            z_mm.fill(f32::NAN);
+            return Ok(());
         };
         let span = first..(last + 2).min(columns);
         let as_they_are = as_they_are(&places);
-        heights.z_mm.par_chunks_mut(16 * window.columns).enumerate().try_for_each(|(chunk, out)| {
+        z_mm.par_chunks_mut(16 * window.columns).enumerate().try_for_each(|(chunk, out)| {
+            out.fill(f32::NAN);
             let mut lines = [(u64::MAX, Vec::new()), (u64::MAX, Vec::new())];
             for (index, out) in out.chunks_mut(window.columns).enumerate() {
                 let row = window.row + (chunk * 16 + index) as i64;
@@ -258,8 +265,7 @@ impl HeightImage {
                 }
             }
             Ok::<(), Error>(())
-        })?;
-        Ok(heights)
+        })
     }
 }
 
@@ -319,6 +325,10 @@ impl Surface for HeightImage {
 
     fn heights(&self, window: Window, datum_mm: f64) -> Result<Heights, Error> {
         self.sample(&columns_mm(&self.lattice, &window), window, datum_mm)
+    }
+
+    fn heights_onto(&self, window: Window, datum_mm: f64, z_mm: &mut [f32]) -> Result<(), Error> {
+        self.sample_onto(&columns_mm(&self.lattice, &window), window, datum_mm, z_mm)
     }
 
     fn heights_mirrored(&self, window: Window, datum_mm: f64) -> Result<Heights, Error> {

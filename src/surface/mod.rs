@@ -64,6 +64,12 @@ pub trait Surface: Send + Sync {
     /// part, and holes in it, are NaN. The same sample gets the same bits whatever the window.
     fn heights(&self, window: Window, datum_mm: f64) -> Result<Heights, Error>;
 
+    /// As [`Surface::heights`], in memory that is there: as many samples as the window has.
+    fn heights_onto(&self, window: Window, datum_mm: f64, z_mm: &mut [f32]) -> Result<(), Error> {
+        z_mm.copy_from_slice(&self.heights(window, datum_mm)?.z_mm);
+        Ok(())
+    }
+
     /// Heights at (width - x, y): the part seen from behind, as a die needs it. Exact for every
     /// width where the surface overrides it; without that the width must be whole steps.
     fn heights_mirrored(&self, window: Window, datum_mm: f64) -> Result<Heights, Error> {
@@ -134,6 +140,9 @@ macro_rules! forward {
             }
             fn heights(&self, window: Window, datum_mm: f64) -> Result<Heights, Error> {
                 (**self).heights(window, datum_mm)
+            }
+            fn heights_onto(&self, window: Window, datum_mm: f64, z_mm: &mut [f32]) -> Result<(), Error> {
+                (**self).heights_onto(window, datum_mm, z_mm)
             }
             fn heights_mirrored(&self, window: Window, datum_mm: f64) -> Result<Heights, Error> {
                 (**self).heights_mirrored(window, datum_mm)

@@ -103,17 +103,26 @@ impl HeightWriter {
     /// # Panics
     /// When a band is of another width or has more rows than are left.
     pub fn write(&mut self, band: &Heights) -> Result<(), Error> {
-        assert_eq!(band.window.columns, self.columns, "a band as wide as the file");
-        assert!(self.given + band.window.rows <= self.rows, "no more rows than announced");
+        self.write_rows(band.window.columns, &band.z_mm)
+    }
+
+    /// As [`HeightWriter::write`], of rows of so many columns.
+    ///
+    /// # Panics
+    /// As there.
+    pub fn write_rows(&mut self, columns: usize, z_mm: &[f32]) -> Result<(), Error> {
+        assert_eq!(columns, self.columns, "a band as wide as the file");
+        let rows = z_mm.len() / columns;
+        assert!(self.given + rows <= self.rows, "no more rows than announced");
         let io = |source| Error::Unwritable { path: self.name.clone(), source };
-        let lines = band.z_mm.chunks_exact(self.columns);
+        let lines = z_mm.chunks_exact(self.columns);
         self.buffer.clear();
         match &mut self.format {
             Format::Tiff { data } => {
                 for line in lines.rev() {
                     put_floats(line, &mut self.buffer, f32::to_le_bytes);
                 }
-                let row = (self.rows - self.given - band.window.rows) as u64;
+                let row = (self.rows - self.given - rows) as u64;
                 let place = *data + row * self.columns as u64 * 4;
                 let file = self.file.file_mut();
                 file.seek(SeekFrom::Start(place)).map_err(io)?;
@@ -145,7 +154,7 @@ impl HeightWriter {
                 values.write_all(&self.buffer).map_err(io)?;
             }
         }
-        self.given += band.window.rows;
+        self.given += rows;
         Ok(())
     }
 
