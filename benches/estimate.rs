@@ -1,5 +1,6 @@
-//! `cargo bench --bench estimate [-- MILLIONS]`: a program of that many million blocks (10 if left out),
-//! read and timed for each of some machines, and a million moves written; blocks a second, and the peak of memory.
+//! `cargo bench --bench estimate [-- MILLIONS]`: programs of that many million blocks (10 if left out), of a relief and of
+//! a zigzag, read and timed for each of some machines, and a million moves written; blocks a second without the making
+//! of the text, and the peak of memory.
 
 use std::hint::black_box;
 use std::io::{BufReader, Read};
@@ -10,8 +11,35 @@ use screenmill::post::{self, Dialect, Program, StockFacts, ZZero};
 use screenmill::toolpath::{Kind, Move, Toolpath};
 use screenmill::verify::{self, Clock, Kinematics, Options, Travel};
 
-/// The text of a wavy relief in blocks of 0.05 mm, made as it is read, so that no memory holds it.
+/// What blocks of 0.05 mm run along.
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    /// A wavy relief, row by row.
+    Relief,
+    /// Corners of 90 degrees, each block to the other side.
+    Zigzag,
+}
+
+impl Form {
+    fn place(self, block: u64) -> [f64; 3] {
+        let (row, column) = (block / 1000, block % 1000);
+        let column = if row.is_multiple_of(2) { column } else { 999 - column };
+        match self {
+            Form::Relief => {
+                let (x, y) = (0.05 * column as f64, 0.05 * row as f64);
+                [x, y, 0.15 * ((1.9 * x + 0.4 * y).sin() + 0.5 * (4.7 * x - y).cos() - 0.5)]
+            }
+            Form::Zigzag => {
+                let side = 0.05 * 0.5f64.sqrt();
+                [side * column as f64, side * (row + block % 2) as f64, 0.0]
+            }
+        }
+    }
+}
+
+/// The text of blocks of 0.05 mm, made as it is read, so that no memory holds it.
 struct Relief {
+    form: Form,
     left: u64,
     block: u64,
     line: Vec<u8>,
@@ -28,10 +56,7 @@ impl Read for Relief {
             // Some lines at once.
             for _ in 0..256.min(self.left) {
                 self.left -= 1;
-                let (row, column) = (self.block / 1000, self.block % 1000);
-                let column = if row.is_multiple_of(2) { column } else { 999 - column };
-                let (x, y) = (0.05 * column as f64, 0.05 * row as f64);
-                let z = 0.15 * ((1.9 * x + 0.4 * y).sin() + 0.5 * (4.7 * x - y).cos() - 0.5);
+                let [x, y, z] = self.form.place(self.block);
                 use std::io::Write;
                 writeln!(self.line, "G1 X{x:.4} Y{y:.4} Z{z:.4}")?;
                 self.block += 1;
@@ -47,8 +72,8 @@ impl Read for Relief {
     }
 }
 
-fn relief(blocks: u64, head: &'static [u8]) -> BufReader<Relief> {
-    BufReader::with_capacity(1 << 16, Relief { left: blocks, block: 0, line: Vec::new(), at: 0, head })
+fn relief(form: Form, blocks: u64, head: &'static [u8]) -> BufReader<Relief> {
+    BufReader::with_capacity(1 << 16, Relief { form, left: blocks, block: 0, line: Vec::new(), at: 0, head })
 }
 
 /// Peak resident set in MB, where the system tells.
@@ -100,9 +125,13 @@ fn write() {
 fn main() {
     let millions: f64 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(10.0);
     let blocks = (millions * 1e6) as u64;
-    let start = Instant::now();
-    black_box(std::io::copy(&mut relief(blocks, b""), &mut std::io::sink()).expect("no file is read"));
-    let making = start.elapsed().as_secs_f64();
+    let making = |form: Form| {
+        let start = Instant::now();
+        black_box(
+            std::io::copy(&mut relief(form, blocks, b""), &mut std::io::sink()).expect("no file is read"),
+        );
+        start.elapsed().as_secs_f64()
+    };
     let modes: [(&str, &'static [u8]); 4] = [
         ("linuxcnc-sim", b"G21 G90 G64 P0.001 Q0\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
         ("linuxcnc-sim", b"G21 G90 G64 P0.002\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
@@ -110,12 +139,12 @@ fn main() {
         ("grbl-router", b"G21 G90\nM3 S1000\nG0 Z5\nG0 X0 Y0\nF600\n"),
     ];
     write();
-    println!("{millions} million blocks; making the text is taken off ({making:.1} s)");
-    for (name, head) in modes {
+    for (form, (name, head)) in [Form::Relief, Form::Zigzag].into_iter().flat_map(|f| modes.map(|m| (f, m))) {
+        let making = making(form);
         let machine = Machine::find(name, None).expect("a machine that comes along");
         let mut clock = Clock::new(&Kinematics::from(&machine), Travel::default());
         let start = Instant::now();
-        let summary = verify::read(&mut relief(blocks, head), &Options::default(), &mut |event| {
+        let summary = verify::read(&mut relief(form, blocks, head), &Options::default(), &mut |event| {
             clock.event(event);
             Ok(())
         })
@@ -124,7 +153,7 @@ fn main() {
         let seconds = start.elapsed().as_secs_f64() - making;
         let mode = String::from_utf8_lossy(head).lines().next().unwrap_or("").replace("G21 G90 ", "");
         println!(
-            "{name:<13} {mode:<14} {:.2} million blocks a second, program of {hours:.2} h, peak {:.1} MB",
+            "{form:?}, {name:<13} {mode:<14} {:.2} million blocks a second, program of {hours:.2} h, peak {:.1} MB",
             1e-6 * summary.blocks as f64 / seconds,
             peak_mb().unwrap_or(f64::NAN)
         );

@@ -6,6 +6,10 @@ use super::{Controller, Limits, SAME_PLACE};
 const RAMP_TIME: f64 = 0.01;
 const NO_SPEED: f64 = 1e-8;
 const NO_TIME: f64 = 1e-12;
+/// Braking is even within this part of its square.
+const EVEN: f64 = 1e-12;
+/// What is this part of a limit is below it, however it was rounded.
+const CLEAR: f64 = 1.0 - 1e-9;
 
 impl Controller {
     /// One cycle of the servo loop, or up to `most` at once while nothing changes.
@@ -19,9 +23,16 @@ impl Controller {
             hand_over(head, rest, &limits);
         } else {
             head.period = limits.period;
-            cycles += cruise(head, rest.first(), &limits, most - 1);
-            step(head, rest.first(), &limits);
-            parabola(head, rest, &limits);
+            let bounds = Bounds::of(head, rest.first(), &limits);
+            cycles += cruise(head, &bounds, &limits, most - 1);
+            if !head.ramp {
+                cycles += speed_up(head, &bounds, &limits, most - cycles);
+                cycles += slow_down(head, rest, &bounds, &limits, most - cycles);
+            }
+            step(head, &bounds, &limits);
+            if head.end == End::Parabola {
+                parabola(head, rest, &limits);
+            }
         }
         if head.rapid {
             self.cycles.rapid += cycles;
@@ -50,29 +61,43 @@ fn target(segment: &Segment, limits: &Limits) -> f64 {
     segment.speed_asked().min(limits.path_speed)
 }
 
-fn end_speed(segment: &Segment, next: Option<&Segment>, limits: &Limits) -> f64 {
-    match next {
-        Some(next) if segment.end == End::Tangent => {
-            segment.end_speed.min(target(segment, limits)).min(target(next, limits))
-        }
-        _ => 0.0,
+/// What holds of a segment while it runs and nothing more comes in.
+struct Bounds {
+    /// Speed that it may end at.
+    end: f64,
+    /// Speed asked for.
+    asked: f64,
+    /// Acceleration along the path.
+    along: f64,
+}
+
+impl Bounds {
+    fn of(segment: &Segment, next: Option<&Segment>, limits: &Limits) -> Bounds {
+        let asked = target(segment, limits);
+        let end = match next {
+            Some(next) if segment.end == End::Tangent => {
+                segment.end_speed.min(asked).min(target(next, limits))
+            }
+            _ => 0.0,
+        };
+        Bounds { end, asked, along: segment.acceleration_along() }
     }
 }
 
 /// Runs whole cycles at an even speed, as long as braking is not due: it begins
 /// (v^2 - end^2) / 2a + v T before the end.
-fn cruise(head: &mut Segment, next: Option<&Segment>, limits: &Limits, most: u64) -> u64 {
+fn cruise(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> u64 {
     let speed = head.speed;
     if most == 0 || head.handing_over || speed <= 0.0 {
         return 0;
     }
-    let end = end_speed(head, next, limits);
+    let end = bounds.end;
     let step = speed * limits.period;
     let left = head.left();
-    let cycles = if even(head, end, left, limits) {
+    let cycles = if even(head, bounds, left) {
         left / step - 1.0
-    } else if !head.ramp && speed == target(head, limits) {
-        (left - (speed * speed - end * end).max(0.0) / (2.0 * head.acceleration_along())) / step - 2.0
+    } else if !head.ramp && speed == bounds.asked {
+        (left - (speed * speed - end * end).max(0.0) / (2.0 * bounds.along)) / step - 2.0
     } else {
         return 0;
     };
@@ -84,20 +109,84 @@ fn cruise(head: &mut Segment, next: Option<&Segment>, limits: &Limits, most: u64
     cycles
 }
 
+/// Runs whole cycles of [`step`] at full acceleration, bit by bit what they come to, as long as they are clear of what
+/// ends that by more than rounding: the speed asked for, braking and the end.
+fn speed_up(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> u64 {
+    if head.handing_over {
+        return 0;
+    }
+    let &Bounds { end, along, .. } = bounds;
+    let asked = bounds.asked * CLEAR;
+    let gain = along * limits.period;
+    let mut cycles = 0;
+    while cycles < most {
+        let speed = head.speed + gain;
+        let root = end * end + along * (2.0 * head.left() - head.speed * limits.period);
+        let needed = speed * (speed + gain);
+        if speed >= asked || needed >= root * CLEAR {
+            break;
+        }
+        let progress = head.progress + 0.5 * (speed + head.speed) * limits.period;
+        if far_from_end(head.length - progress, speed, end, gain, limits) {
+            (head.speed, head.progress, head.braking) = (speed, progress, false);
+            cycles += 1;
+        } else {
+            break;
+        }
+    }
+    cycles
+}
+
+/// Runs whole cycles of braking evenly. Each takes `gain` off the speed: with h half of it, (v' + h)^2 = e^2 + a (2 l - v T) + h^2
+/// and l' = l - (v + v') T / 2 give (v'' + h)^2 = (v' - h)^2. While a parabola hands over, only as long as the next segment
+/// speeds up, which takes part.
+fn slow_down(head: &mut Segment, rest: &mut [Segment], bounds: &Bounds, limits: &Limits, most: u64) -> u64 {
+    let &Bounds { end, asked, along } = bounds;
+    let gain = along * limits.period;
+    let half = 0.5 * gain;
+    let root = end * end + along * (2.0 * head.left() - head.speed * limits.period) + half * half;
+    let needed = (head.speed - half) * (head.speed - half);
+    if (root - needed).abs() > EVEN * needed || head.speed - gain > asked {
+        return 0;
+    }
+    let mut lowest = end;
+    if head.end == End::Parabola && !head.handing_over {
+        let Some(next) = rest.first() else { return 0 };
+        lowest = lowest.max(parabola_begins(head, next, asked, target(next, limits)));
+    }
+    let cycles = (head.speed - lowest) / gain - 2.0;
+    if !(1.0..1e9).contains(&cycles) {
+        return 0;
+    }
+    let mut cycles = (cycles as u64).min(most);
+    if head.handing_over {
+        let Some(next) = rest.first_mut() else { return 0 };
+        cycles = speed_up(next, &Bounds::of(next, None, limits), limits, cycles);
+    }
+    head.progress += cycles as f64 * limits.period * (head.speed - half * cycles as f64);
+    head.speed -= cycles as f64 * gain;
+    head.braking |= cycles > 0;
+    cycles
+}
+
+/// Whether a cycle of no more than full acceleration cannot come to the end.
+fn far_from_end(left: f64, speed: f64, end: f64, gain: f64, limits: &Limits) -> bool {
+    left * CLEAR > (speed.max(end) + gain) * limits.period
+}
+
 /// One step of a segment over its period.
-fn step(segment: &mut Segment, next: Option<&Segment>, limits: &Limits) {
-    let end = end_speed(segment, next, limits);
+fn step(segment: &mut Segment, bounds: &Bounds, limits: &Limits) {
+    let &Bounds { end, along, .. } = bounds;
     let left = segment.left();
-    if even(segment, end, left, limits) {
+    if even(segment, bounds, left) {
         return coast(segment, limits);
     }
-    let along = segment.acceleration_along();
     let (acceleration, desired) = if segment.ramp && segment.end == End::Tangent && end >= NO_SPEED {
         let mean = 0.5 * (segment.speed + end);
         let time = if mean > NO_SPEED { (left / mean).max(1e-16) } else { 1e-16 };
         (((end - segment.speed) / time).clamp(-along, along), end)
     } else {
-        trapezoid(segment, end, along, left, limits)
+        trapezoid(segment, bounds, left)
     };
     let speed = segment.speed + acceleration * segment.period;
     if speed < 0.0 {
@@ -115,10 +204,11 @@ fn step(segment: &mut Segment, next: Option<&Segment>, limits: &Limits) {
 }
 
 /// Whether nothing changes the speed from here to the end.
-fn even(segment: &Segment, end: f64, left: f64, limits: &Limits) -> bool {
+fn even(segment: &Segment, bounds: &Bounds, left: f64) -> bool {
+    let end = bounds.end;
     segment.speed == end
         && end > NO_SPEED
-        && (segment.ramp || segment.speed == target(segment, limits) && left >= end * segment.period)
+        && (segment.ramp || segment.speed == bounds.asked && left >= end * segment.period)
 }
 
 /// What [`step`] comes to at an even speed.
@@ -137,11 +227,11 @@ fn coast(segment: &mut Segment, limits: &Limits) {
 }
 
 /// Acceleration of a step, and the speed from which the end can just be braked for.
-fn trapezoid(segment: &Segment, end: f64, along: f64, left: f64, limits: &Limits) -> (f64, f64) {
+fn trapezoid(segment: &Segment, bounds: &Bounds, left: f64) -> (f64, f64) {
+    let &Bounds { end, asked, along } = bounds;
     let half = 0.5 * along * segment.period;
     let root = end * end + along * (2.0 * left - segment.speed * segment.period) + half * half;
     let most = if root > half * half { root.sqrt() - half } else { -half };
-    let asked = target(segment, limits);
     let speed = most.clamp(-asked, asked);
     let period = segment.period.max(NO_TIME);
     (((speed - segment.speed) / period).clamp(-along, along), most)
@@ -158,7 +248,7 @@ fn look_for_end(segment: &mut Segment, end: f64, along: f64, limits: &Limits) {
         segment.done = stops;
         return;
     }
-    if stops {
+    if stops || far_from_end(left, segment.speed, end, along * limits.period, limits) {
         return;
     }
     let mean = 0.5 * (segment.speed + end);
@@ -199,20 +289,17 @@ fn hand_over(head: &mut Segment, rest: &mut [Segment], limits: &Limits) {
         next.period = limits.period - ending.time;
         next.speed = ending.speed;
     }
-    step(next, after.first(), limits);
+    step(next, &Bounds::of(next, after.first(), limits), limits);
 }
 
 /// Begins the next segment while this one brakes.
 fn parabola(head: &mut Segment, rest: &mut [Segment], limits: &Limits) {
-    if head.end != End::Parabola {
-        return;
-    }
     let Some(next) = rest.first_mut() else { return };
     if !head.handing_over && head.braking {
         let begins = parabola_begins(head, next, target(head, limits), target(next, limits));
         head.handing_over = head.speed < begins;
     }
     if head.handing_over {
-        step(next, None, limits);
+        step(next, &Bounds::of(next, None, limits), limits);
     }
 }

@@ -51,3 +51,59 @@ pub(super) struct Controller {
     queue: VecDeque<Segment>,
     pub cycles: Cycles,
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::verify::reading::PathMode;
+
+    const LIMITS: Limits = Limits {
+        speed: DVec3::new(80.0, 80.0, 50.0),
+        feed: DVec3::new(80.0, 80.0, 50.0),
+        acceleration: DVec3::new(500.0, 500.0, 300.0),
+        path_speed: 80.0,
+        period: 0.001,
+        depth: 50,
+    };
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn cycles_at_once_are_cycles_one_by_one(
+            ways in proptest::collection::vec((-0.3..0.3f64, -0.3..0.3f64, -0.05..0.05f64), 2..40),
+            scale in prop_oneof![Just(0.1), Just(1.0), Just(20.0)],
+            feed in 2.0..80.0f64,
+            mode in prop_oneof![
+                Just(PathMode::Exact),
+                Just(PathMode::Stop),
+                Just(PathMode::Blend { tolerance_mm: Some(0.002), merge_mm: Some(0.0) }),
+                Just(PathMode::Blend { tolerance_mm: None, merge_mm: None }),
+            ],
+        ) {
+            let full = || {
+                let mut controller = Controller::new(LIMITS, DVec3::ZERO, 0.0);
+                controller.path(mode);
+                let mut at = DVec3::ZERO;
+                for &(x, y, z) in &ways {
+                    at += scale * DVec3::new(x, y, z);
+                    controller.feed(at, feed);
+                }
+                // Two more come than the chain holds back.
+                controller.feed(at + DVec3::X, feed);
+                controller.rapid(DVec3::ZERO);
+                controller
+            };
+            let (mut at_once, mut one_by_one) = (full(), full());
+            at_once.drain();
+            while !one_by_one.queue.is_empty() {
+                one_by_one.cycle(1);
+            }
+            let [a, b] = [at_once, one_by_one].map(|c| (c.cycles.cutting, c.cycles.rapid));
+            // A segment that ends with its cycle may be rounded to end with the next.
+            prop_assert!(a.0.abs_diff(b.0) <= 1 && a.1.abs_diff(b.1) <= 1, "{:?} and {:?}", a, b);
+        }
+    }
+}
