@@ -241,11 +241,49 @@ fn an_estimate_says_what_limits() {
         .current_dir(dir.path())
         .args(["estimate", "far.ngc", "--machine", "linuxcnc-mill"])
         .assert()
-        .success()
+        .code(1)
         .stdout(
             predicate::str::contains("cutting 906.0 mm, 0.7 s rapids 6.0 mm")
-                .and(predicate::str::contains("note: moves 900.000 mm in X, linuxcnc-mill travels 400 mm")),
+                .and(predicate::str::contains("error: line 6: moves 900.000 mm in X, from 0.000 (line 4) to 900.000 (line 6), linuxcnc-mill travels 400 mm\n")),
         );
+}
+
+/// What a controller takes of a line is known with its machine; an unconfirmed length is only noted.
+#[test]
+fn lines_longer_than_the_machines_controller_takes_are_refused() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let comment = "c".repeat(300);
+    let part = "G1 X1.000 Y1.000 Z-0.100 F100 ";
+    for (name, line) in
+        [("comment.nc", format!("({comment})")), ("words.nc", part.to_owned() + &" ".repeat(60))]
+    {
+        let text = format!("G21 G90\nM3 S9000\nG0 Z5\nG0 X0 Y0\n{line}\n{part}\nG0 Z5\nM2\n");
+        std::fs::write(dir.path().join(name), text).expect("a program");
+    }
+    let zeros = format!("G1 X1.{} Y1 Z-0.1 F100", "0".repeat(70));
+    let text = format!("G21 G90\nM3 S9000\nG0 Z5\nG0 X0 Y0\n{zeros}\nG0 Z5\nM2\n");
+    std::fs::write(dir.path().join("zeros.nc"), text).expect("a program");
+    let estimate = |file: &str, machine: &str| {
+        screenmill().current_dir(dir.path()).args(["estimate", file, "--machine", machine]).assert()
+    };
+    let refused = |column: usize, most: &str| {
+        format!(
+            ": line 5, column {column}: the line goes on past the {most} that this machine's controller takes; hint: shorten its \
+             comment, or put its words on two lines\n"
+        )
+    };
+    let ends = |end: String| predicate::str::ends_with(end);
+    estimate("comment.nc", "linuxcnc-mill").code(2).stderr(ends(refused(253, "252 bytes")));
+    estimate("words.nc", "linuxcnc-mill").success();
+    // Grbl's buffer takes neither blanks nor comments.
+    estimate("comment.nc", "grbl-router").success();
+    estimate("words.nc", "grbl-router").success();
+    let words = "79 bytes without blanks and comments";
+    estimate("zeros.nc", "grbl-router").code(2).stderr(ends(refused(83, words)));
+    estimate("zeros.nc", "linuxcnc-mill").success();
+    estimate("zeros.nc", "roland-mdx-50").success().stdout(predicate::str::contains(
+        "note: line 5, column 81: longer than 80 bytes, which no source confirms this controller takes",
+    ));
 }
 
 #[test]

@@ -312,7 +312,7 @@ fn rml_cuts_the_same_beside_the_surface() {
 /// Where the cutter goes before it has come down and after it has gone up for good differs from controller to controller.
 fn path(bench: &Bench, nth: usize, rml_unit_mm: f64) -> Vec<[f64; 3]> {
     let file = programs(&bench.json("out/report.json"))[nth].clone();
-    let options = Options { rml_unit_mm };
+    let options = Options { rml_unit_mm, ..Options::default() };
     let reading = Reading::of(bench.text(&format!("out/{file}")).as_bytes(), &options).expect("readable");
     let motions = &reading.motions;
     let low = |m: &screenmill::verify::Motion| m.known() && m.to_mm[2] < 4.9;

@@ -285,7 +285,7 @@ fn twenty_passes(unit_mm: f64) -> Toolpath {
 }
 
 fn reading(text: &[u8], dialect: &Dialect) -> Reading {
-    let options = Options { rml_unit_mm: dialect.unit_mm };
+    let options = Options { rml_unit_mm: dialect.unit_mm, ..Options::default() };
     Reading::of(text, &options).unwrap_or_else(|e| panic!("{}: {e}", dialect.name))
 }
 
@@ -342,7 +342,7 @@ fn a_program_is_resumed_at_every_pass_in_every_dialect() {
     for (name, machine, _) in DIALECTS {
         let dialect = Dialect::find(name, None).expect("embedded");
         let machine = Machine::find(machine, None).expect("embedded");
-        let options = Options { rml_unit_mm: dialect.unit_mm };
+        let options = Options { rml_unit_mm: dialect.unit_mm, ..Options::default() };
         let path = twenty_passes(dialect.unit_mm);
         let text = text_of(&path, tool, &dialect, &machine);
         let whole = reading(&text, &dialect);

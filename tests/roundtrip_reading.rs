@@ -202,7 +202,7 @@ fn rml_modes_and_ways_of_moving() {
 
 #[test]
 fn coarse_units_are_an_option() {
-    let options = Options { rml_unit_mm: 0.025 };
+    let options = Options { rml_unit_mm: 0.025, ..Options::default() };
     let reading = Reading::of(b"^IN;V 15;Z 40,80,-4;\n", &options).expect("a sound program");
     assert_eq!(reading.motions[0].to_mm, [1.0, 2.0, -0.1]);
 }

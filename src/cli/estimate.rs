@@ -46,6 +46,8 @@ struct Estimated {
     timing: Timing,
     /// What its operator should know.
     notes: Vec<String>,
+    /// Why its machine cannot run it.
+    errors: Vec<String>,
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
@@ -67,9 +69,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let mut total_s = 0.0;
     let mut limits: Vec<(&'static str, f64)> = Vec::new();
     let mut programs = Vec::new();
+    let mut runs = true;
     for path in &arguments.programs {
         let mut one = estimate(path, &options, &kinematics)?;
-        one.notes.extend(past_travel(&one.extent, &machine));
+        for past in past_travel(&one.extent, one.summary.language, &machine) {
+            if past.harmless { one.notes.push(past.message) } else { one.errors.push(past.message) }
+        }
+        runs &= one.errors.is_empty();
         total_s += one.timing.total_s;
         for (name, seconds) in one.timing.limits() {
             match limits.iter_mut().find(|l| l.0 == name) {
@@ -100,7 +106,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
             );
         }
     }
-    Ok(Outcome::Within)
+    Ok(if runs { Outcome::Within } else { Outcome::Found })
 }
 
 fn job(path: &Path, common: &Common) -> Result<Outcome, Refusal> {
@@ -160,7 +166,7 @@ fn estimate(path: &Path, options: &Options, kinematics: &Kinematics) -> Result<E
     })?;
     let timing = timer.finish(summary.bytes);
     let notes = summary.notes.iter().map(ToString::to_string).collect();
-    Ok(Estimated { summary, extent, timing, notes })
+    Ok(Estimated { summary, extent, timing, notes, errors: Vec::new() })
 }
 
 /// RML-1 has no rapids, so its travels have to be found before the text is timed.
@@ -189,7 +195,7 @@ fn shares(limits: &[(&'static str, f64)], total_s: f64) -> String {
 }
 
 fn program(path: &Path, one: &Estimated) -> Value {
-    let Estimated { summary, extent, timing, notes } = one;
+    let Estimated { summary, extent, timing, notes, errors } = one;
     let limits = timing.limits();
     json!({
         "file": path.display().to_string(), "language": summary.language.to_string(),
@@ -198,12 +204,12 @@ fn program(path: &Path, one: &Estimated) -> Value {
         "time_s": timing.total_s, "cutting_s": timing.cutting_s, "rapid_s": timing.rapid_s,
         "dwell_s": timing.dwell_s, "pauses": timing.pauses,
         "limited_by": limits.first().map(|l| l.0), "parts": parts(&limits),
-        "notes": notes,
+        "notes": notes, "errors": errors,
     })
 }
 
 fn print(path: &Path, one: &Estimated) {
-    let Estimated { summary, extent, timing, notes } = one;
+    let Estimated { summary, extent, timing, notes, errors } = one;
     println!("{}: {}, {} blocks", path.display(), summary.language, summary.blocks);
     println!(
         "  {} ({} cutting {}, {} rapids {}, {} dwell)",
@@ -217,6 +223,9 @@ fn print(path: &Path, one: &Estimated) {
     println!("  {}", shares(&timing.limits(), timing.total_s));
     if timing.pauses > 0 {
         println!("  {} stops for the operator, whose time is not counted", timing.pauses);
+    }
+    for error in errors {
+        println!("  error: {error}");
     }
     for note in notes {
         println!("  note: {note}");

@@ -2,7 +2,7 @@
 
 use screenmill::catalogue::{self, Kind};
 use screenmill::machine::Machine;
-use screenmill::post::{Dialect, Feed, FeedUnit, LengthUnit, Motion, Number, Place, Point, When};
+use screenmill::post::{Dialect, Feed, FeedUnit, LengthUnit, LineCounts, Motion, Number, Place, Point, When};
 
 use super::{Common, Outcome, Refusal};
 
@@ -73,7 +73,14 @@ fn explained(dialect: &Dialect) -> Vec<String> {
     lines.push(String::new());
     let mm = limits.value_max as f64 * dialect.unit_mm;
     lines.push(format!("grid       {} mm; toolpaths are laid on it", dialect.unit_mm));
-    lines.push(format!("lines      at most {} bytes, ended by {:?}", limits.line_max, dialect.line_ending));
+    let counted = match limits.line_counts {
+        LineCounts::Bytes => "",
+        LineCounts::Words => " (read: without blanks and comments)",
+    };
+    lines.push(format!(
+        "lines      at most {} bytes{counted}, ended by {:?}",
+        limits.line_max, dialect.line_ending
+    ));
     lines.push(format!("range      coordinates within +-{mm} mm; dwells up to {} s", limits.dwell_max_s));
     if !limits.missing.is_empty() {
         lines.push(format!("not known  {}", limits.missing.join(" ")));

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 
 use screenmill::machine::Machine;
-use screenmill::post::Dialect;
-use screenmill::verify::{self, Event, Extent, Language, Options, Reading, Summary};
+use screenmill::post::{Dialect, LineCounts};
+use screenmill::verify::{self, Event, Extent, Language, LineLimit, Options, Reading, Summary};
 use serde_json::{Value, json};
 
 use super::Refusal;
@@ -32,15 +32,26 @@ fn open(path: &Path) -> Result<BufReader<File>, Refused> {
     Ok(BufReader::with_capacity(BUFFER, file))
 }
 
-/// The unit of RML-1 on this machine, which the text does not say.
+/// What a text does not say of this machine: the unit of its RML-1, and how long a line its controller takes.
 pub fn reading_options(machine: &Machine) -> Result<Options, Refusal> {
-    for name in &machine.dialects {
-        let dialect = Dialect::find(name, None)?;
-        if dialect.extension == "rml" {
-            return Ok(Options { rml_unit_mm: dialect.unit_mm });
-        }
+    let dialects: Vec<Dialect> =
+        machine.dialects.iter().map(|name| Dialect::find(name, None)).collect::<Result<_, _>>()?;
+    let is_rml = |dialect: &&Dialect| dialect.extension == "rml";
+    let rml = dialects.iter().find(is_rml);
+    let gcode = dialects.iter().find(|dialect| !is_rml(dialect));
+    let default = Options::default();
+    Ok(Options {
+        rml_unit_mm: rml.map_or(default.rml_unit_mm, |dialect| dialect.unit_mm),
+        line: gcode.map(line_limit),
+    })
+}
+
+fn line_limit(dialect: &Dialect) -> LineLimit {
+    LineLimit {
+        bytes: dialect.limits.line_max,
+        words_only: dialect.limits.line_counts == LineCounts::Words,
+        confirmed: !dialect.unconfirmed.iter().any(|key| key == "limits.line_max"),
     }
-    Ok(Options::default())
 }
 
 /// The language of a program, from its beginning.
@@ -96,14 +107,34 @@ pub fn bounds(extent: &Extent) -> Value {
     json!({ "x": axis(0), "y": axis(1), "z": axis(2) })
 }
 
-/// The axes on which a program goes farther than its machine can.
-pub fn past_travel(extent: &Extent, machine: &Machine) -> Vec<String> {
+/// An axis on which a program goes farther than its machine can.
+pub struct PastTravel {
+    pub message: String,
+    /// The machine stops at its highest point by itself, and goes on from there.
+    pub harmless: bool,
+}
+
+/// The axes on which a program goes farther than its machine can. A lift in RML-1 may ask for more than there is: the tool
+/// then goes as high as it can.
+pub fn past_travel(extent: &Extent, language: Language, machine: &Machine) -> Vec<PastTravel> {
     let travel = [machine.travel.x_mm, machine.travel.y_mm, machine.travel.z_mm];
     let span = |axis: usize| extent.high_mm[axis] - extent.low_mm[axis];
-    let past = (0..3).filter(|axis| span(*axis) > travel[*axis]);
+    let past = (0..3).filter(|axis| span(*axis) > travel[*axis] + 1e-6);
     past.map(|axis| {
         let name = ["X", "Y", "Z"][axis];
-        format!("moves {:.3} mm in {name}, {} travels {} mm", span(axis), machine.name, travel[axis])
+        let [low, high] = [extent.low_line[axis], extent.high_line[axis]];
+        let harmless = axis == 2 && language == Language::Rml1;
+        let hint = if harmless { "; it then goes no higher than it can" } else { "" };
+        let message = format!(
+            "line {}: moves {:.3} mm in {name}, from {:.3} (line {low}) to {:.3} (line {high}), {} travels {} mm{hint}",
+            low.max(high),
+            span(axis),
+            extent.low_mm[axis],
+            extent.high_mm[axis],
+            machine.name,
+            travel[axis]
+        );
+        PastTravel { message, harmless }
     })
     .collect()
 }

@@ -348,8 +348,9 @@ impl Program {
     }
 
     fn travel(&self, machine: &Machine, findings: &mut Vec<Finding>) {
-        for past in past_travel(&self.extent, machine) {
-            findings.push(finding(Severity::Error, "travel", format!("{} {past}", self.file)));
+        for past in past_travel(&self.extent, self.reading.summary.language, machine) {
+            let severity = if past.harmless { Severity::Note } else { Severity::Error };
+            findings.push(finding(severity, "travel", format!("{} {}", self.file, past.message)));
         }
     }
 

@@ -69,6 +69,9 @@ impl LineEnding {
 pub struct Limits {
     /// Longest line in bytes, its ending not counted.
     pub line_max: usize,
+    /// What of a line its controller counts. What is written is held to it with all of its bytes.
+    #[serde(default)]
+    pub line_counts: LineCounts,
     /// Largest coordinate, in units of the grid.
     pub value_max: i64,
     pub dwell_max_s: f64,
@@ -76,6 +79,16 @@ pub struct Limits {
     pub missing: Vec<String>,
     /// Characters that may stand nowhere, beside those that are not printable ASCII.
     pub forbidden: String,
+}
+
+/// What of a line counts towards its longest length.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LineCounts {
+    #[default]
+    Bytes,
+    /// Blanks and comments are taken out before.
+    Words,
 }
 
 /// How a comment is written.

@@ -10,8 +10,8 @@ mod sections;
 mod writer;
 
 pub use dialect::{
-    Blocks, Comment, Dialect, Feed, FeedUnit, LengthUnit, Limits, LineEnding, Motion, Number, Place, Point,
-    When, Words,
+    Blocks, Comment, Dialect, Feed, FeedUnit, LengthUnit, Limits, LineCounts, LineEnding, Motion, Number,
+    Place, Point, When, Words,
 };
 pub use error::Error;
 pub use program::{Program, Section, StockFacts, ZZero};

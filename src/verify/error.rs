@@ -55,6 +55,10 @@ pub enum Error {
     #[error("line {line}: longer than {most} bytes; hint: is this a program?")]
     LineTooLong { line: u64, most: usize },
     #[error(
+        "{at}: the line goes on past the {most} bytes{counted} that this machine's controller takes; hint: shorten its comment, or put its words on two lines"
+    )]
+    LineCut { at: Place, most: usize, counted: &'static str },
+    #[error(
         "{at}: the word {letter} is not read; hint: three axes X Y Z, arcs with I J K R, words F G M N O P Q S T H"
     )]
     Word { at: Place, letter: char },

@@ -21,7 +21,9 @@ pub use error::{Error, Place};
 pub use feeds::{Fastest, Feeds};
 pub use judged::{Blank, Judged, LateralRapid};
 pub use line::lines;
-pub use reading::{Arc, Event, Extent, Language, Motion, Note, Options, PathMode, Reading, Summary};
+pub use reading::{
+    Arc, Event, Extent, Language, LineLimit, Motion, Note, Options, PathMode, Reading, Summary,
+};
 pub use sweep::{Bite, ProgramCut, Swept, sweep};
 pub use text::{language, read};
 pub use time::{Clock, Corner, Kinematics, Timing, time};

@@ -80,6 +80,8 @@ pub enum Note {
     SpindleOff { line: u32 },
     /// The text of an RML-1 program ends while the spindle turns.
     SpindleOn { line: u32 },
+    /// The first line that its controller may not take whole.
+    LongLine { line: u64, column: u64, most: usize },
     /// Some controllers count P in milliseconds.
     LongDwell { line: u32, seconds: f64 },
 }
@@ -94,6 +96,12 @@ impl fmt::Display for Note {
                 write!(
                     f,
                     "line {line}: the text ends while the spindle turns, without !MC0 or H; hint: is the file complete?"
+                )
+            }
+            Note::LongLine { line, column, most } => {
+                write!(
+                    f,
+                    "line {line}, column {column}: longer than {most} bytes, which no source confirms this controller takes"
                 )
             }
             Note::LongDwell { line, seconds } => {
@@ -121,11 +129,23 @@ pub struct Summary {
 pub struct Options {
     /// mm of one RML-1 unit: 0.01, but 0.025 on MDX-15 and MDX-20.
     pub rml_unit_mm: f64,
+    /// What its controller takes of a line of G-code; None where it is not known which one reads it.
+    pub line: Option<LineLimit>,
+}
+
+/// How long a line of G-code may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineLimit {
+    pub bytes: usize,
+    /// Blanks and comments do not count.
+    pub words_only: bool,
+    /// Where no source confirms it, a longer line is only noted.
+    pub confirmed: bool,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { rml_unit_mm: 0.01 }
+        Options { rml_unit_mm: 0.01, line: None }
     }
 }
 
@@ -247,6 +267,9 @@ pub struct Extent {
     /// Lowest and highest end of every motion from the first that leaves X and Y known.
     pub low_mm: [f64; 3],
     pub high_mm: [f64; 3],
+    /// Lines of the first motions that end there.
+    pub low_line: [u32; 3],
+    pub high_line: [u32; 3],
     /// Lengths of feed motions and of rapids between known points.
     pub cutting_mm: f64,
     pub rapid_mm: f64,
@@ -259,6 +282,8 @@ impl Default for Extent {
         Extent {
             low_mm: [f64::INFINITY; 3],
             high_mm: [f64::NEG_INFINITY; 3],
+            low_line: [0; 3],
+            high_line: [0; 3],
             cutting_mm: 0.0,
             rapid_mm: 0.0,
             travel: Travel::default(),
@@ -287,9 +312,13 @@ impl Extent {
         }
         if to[0].is_finite() && to[1].is_finite() {
             for (axis, &value) in to.iter().enumerate() {
-                // min and max leave a NaN out: the height of the machine's home is not known.
-                self.low_mm[axis] = self.low_mm[axis].min(value);
-                self.high_mm[axis] = self.high_mm[axis].max(value);
+                // Neither holds of a NaN: the height of the machine's home is not known.
+                if value < self.low_mm[axis] {
+                    (self.low_mm[axis], self.low_line[axis]) = (value, motion.line);
+                }
+                if value > self.high_mm[axis] {
+                    (self.high_mm[axis], self.high_line[axis]) = (value, motion.line);
+                }
             }
         }
         self.last = to;

@@ -19,7 +19,7 @@ pub fn read(
     each: &mut dyn FnMut(&Event) -> Result<(), Error>,
 ) -> Result<Summary, Error> {
     match language(source.fill_buf()?) {
-        Language::GCode => gcode::read(source, each),
+        Language::GCode => gcode::read(source, options, each),
         Language::Rml1 => rml::read(source, options, each),
     }
 }

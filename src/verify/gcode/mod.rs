@@ -12,7 +12,7 @@ use std::io::BufRead;
 
 use super::error::{Error, Place};
 use super::line;
-use super::reading::{Event, Language, Motion, Note, PathMode, Summary};
+use super::reading::{Event, Language, LineLimit, Motion, Note, Options, PathMode, Summary};
 use arc::Arc;
 use block::{Block, Group};
 
@@ -38,7 +38,7 @@ struct Modal {
 type Sink<'a> = dyn FnMut(&Event) -> Result<(), Error> + 'a;
 
 /// Reads G-code line by line in constant memory.
-pub(super) fn read(source: &mut dyn BufRead, each: &mut Sink) -> Result<Summary, Error> {
+pub(super) fn read(source: &mut dyn BufRead, options: &Options, each: &mut Sink) -> Result<Summary, Error> {
     let mut modal = Modal {
         at_mm: [f64::NAN; 3],
         motion: None,
@@ -69,6 +69,9 @@ pub(super) fn read(source: &mut dyn BufRead, each: &mut Sink) -> Result<Summary,
             // What follows the end is never run.
             continue;
         }
+        if let Some(limit) = options.line {
+            held(limit, &text, number, &mut summary.notes)?;
+        }
         block.parse(&text, number)?;
         if block.words > 0 {
             summary.blocks += 1;
@@ -84,6 +87,46 @@ pub(super) fn read(source: &mut dyn BufRead, each: &mut Sink) -> Result<Summary,
         return Err(if summary.blocks == 0 { Error::Empty } else { Error::NoEnd { line: number } });
     }
     Ok(summary)
+}
+
+/// Holds a line against what its controller takes.
+fn held(limit: LineLimit, text: &[u8], line: u64, notes: &mut Vec<Note>) -> Result<(), Error> {
+    let most = limit.bytes;
+    let Some(cut) = cut(limit, text) else { return Ok(()) };
+    let at = Place { line, column: cut as u64 + 1 };
+    if limit.confirmed {
+        let counted = if limit.words_only { " without blanks and comments" } else { "" };
+        return Err(Error::LineCut { at, most, counted });
+    }
+    if !notes.iter().any(|note| matches!(note, Note::LongLine { .. })) {
+        notes.push(Note::LongLine { line, column: at.column, most });
+    }
+    Ok(())
+}
+
+/// The first byte that a controller does not take any more.
+fn cut(limit: LineLimit, text: &[u8]) -> Option<usize> {
+    if text.len() <= limit.bytes {
+        return None;
+    }
+    if !limit.words_only {
+        return Some(limit.bytes);
+    }
+    let (mut depth, mut counted) = (0, 0);
+    for (at, byte) in text.iter().enumerate() {
+        match byte {
+            b';' if depth == 0 => return None,
+            b'(' => depth = 1,
+            b')' => depth = 0,
+            b' ' | b'\t' => {}
+            _ if depth == 0 => counted += 1,
+            _ => {}
+        }
+        if counted > limit.bytes {
+            return Some(at);
+        }
+    }
+    None
 }
 
 impl Modal {
