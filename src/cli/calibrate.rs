@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(long, num_args = 2, value_names = ["COLUMNS", "ROWS"])]
     pixels: Option<Vec<u32>>,
     /// What the projector's picture covers of the screen plane, in m; the screen if left out
-    #[arg(long, num_args = 4, value_names = ["LEFT", "BOTTOM", "RIGHT", "TOP"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 4, value_names = ["LEFT", "BOTTOM", "RIGHT", "TOP"], allow_hyphen_values = true)]
     frustum: Option<Vec<f64>>,
     /// For the screen as it is elevated, not the flat one of Eq. 9
     #[arg(long)]

@@ -22,7 +22,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     machine: String,
     /// Times of the three programs in seconds, in their order
-    #[arg(long, num_args = 3, value_names = ["T1", "T2", "T3"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["T1", "T2", "T3"], allow_hyphen_values = true)]
     times: Option<Vec<f64>>,
     /// Folder for the programs; with --times, file for the profile (.toml)
     #[arg(long, value_name = "DIR|FILE")]

@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_name = "UM", value_parser = removal)]
     polish_um: Option<f64>,
     /// Pitch of a height file that carries none
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     pixel_mm: Option<f64>,
 }
 

@@ -10,10 +10,10 @@ pub struct Part {
     /// Designed cells (.npz), a mesh (.stl) or heights (.tif, .png, .npy)
     pub part: PathBuf,
     /// Distance of the samples in mm
-    #[arg(long, value_name = "MM", default_value_t = 0.01, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", default_value_t = 0.01, allow_hyphen_values = true)]
     pub step_mm: f64,
     /// Pitch in mm of heights whose file carries none
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     pub pixel_mm: Option<f64>,
     /// Unit of a mesh: mm, m or inch
     #[arg(long, default_value = "mm")]
@@ -22,10 +22,10 @@ pub struct Part {
     #[arg(long, default_value = "z")]
     pub up: Up,
     /// Height in mm of an integer image's darkest value
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     pub z_min_mm: Option<f64>,
     /// Height in mm of an integer image's brightest value
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     pub z_max_mm: Option<f64>,
 }
 

@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(required = true, value_name = "PROGRAM")]
     programs: Vec<PathBuf>,
     /// One cutter a program, in their order, e.g. ball:1
-    #[arg(long = "cutter", required = true, num_args = 1.., value_name = "C")]
+    #[arg(long = "cutter", required = true, num_args = 1.., value_delimiter = ',', value_name = "C")]
     cutters: Vec<Shape>,
     /// What the cut should be
     #[arg(long, value_name = "H.tif")]
@@ -43,10 +43,10 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The programs' zero in the part's frame; its lower left corner at the stock's top if left out
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_hyphen_values = true)]
     zero: Option<Vec<f64>>,
     /// Top of the stock in the part's frame; the part's highest point if left out
-    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    #[arg(long, value_name = "Z", allow_hyphen_values = true)]
     stock_top_mm: Option<f64>,
     /// Machine profile, for times and travel: a name or a file
     #[arg(long, value_name = "NAME")]
