@@ -5,6 +5,8 @@ mod job;
 use job::{Bench, figure, programs};
 use predicates::prelude::*;
 use predicates::str::contains;
+use screenmill::grid::{Heights, Window};
+use screenmill::surface::HeightWriter;
 use serde_json::Value;
 
 fn keys(value: &Value) -> Vec<&str> {
@@ -385,4 +387,27 @@ fn a_shank_that_rubs_is_found_and_its_programs_are_set_aside() {
     let bites = roughing.filter(|p| p["operation"] == "rough").filter_map(|p| p["deepest_bite_mm"].as_f64());
     let deepest = bites.fold(0.0, f64::max);
     assert!((deepest - 0.45).abs() < 1e-6, "{deepest}");
+}
+
+/// Of a part in several pieces some may lie at the stock's top as a whole: they are finished all the same.
+#[test]
+fn roughing_that_finds_nothing_to_cut_is_left_out_of_a_tile_and_said() {
+    let designed = "screen = \"screen.toml\"\ncells = [324, 149, 325, 150]";
+    let bench = Bench::with(&[
+        (designed, "heights = \"flat.npy\"\npixel_mm = 0.02"),
+        ("top_allowance_mm = 0.2", "top_allowance_mm = 0"),
+    ]);
+    let mut flat = HeightWriter::create(&bench.path("flat.npy"), 60, 40, 0.02, [0.0; 2]).unwrap();
+    let window = Window { column: 0, row: 0, columns: 60, rows: 40 };
+    flat.write(&Heights { window, z_mm: vec![0.0; 2400] }).unwrap();
+    flat.finish().unwrap();
+    let report = bench.mill(0);
+    let programs = report["tiles"][0]["programs"].as_array().expect("programs");
+    assert_eq!(programs.len(), 1);
+    assert_eq!(programs[0]["file"], "programs/r0c0-02-finish-ball-1.ngc");
+    let said = report["findings"].as_array().expect("findings").iter().find(|f| f["code"] == "left-out");
+    assert_eq!(
+        said.expect("a note")["message"],
+        "operation 1 (rough, flat-3) has nothing to cut: no metal stands over its stock_to_leave_mm where it can get"
+    );
 }

@@ -230,6 +230,8 @@ pub fn programs(
         left_out: Vec::new(),
         passes: Vec::new(),
     };
+    // Other tiles of the part, and other operations, may have enough to cut.
+    let mut idle = None;
     // Last of all, since they go around the others.
     let outlines = |index: &usize| job.operations[*index].kind == job::Kind::Outline;
     let (last, first): (Vec<usize>, Vec<usize>) = (0..job.operations.len()).partition(outlines);
@@ -270,7 +272,14 @@ pub fn programs(
                     clear_mm,
                 };
                 let path = rough::rough(&job_grid.site(&site, &params), &params, &tell);
-                path.and_then(|path| path.in_units(site.unit_mm)).map_err(refused)?
+                match path.and_then(|path| path.in_units(site.unit_mm)) {
+                    Err(source @ toolpath::Error::NothingToRough { .. }) => {
+                        idle = idle.or(Some(refused(source)));
+                        planned.left_out.push(index);
+                        continue;
+                    }
+                    path => path.map_err(refused)?,
+                }
             }
             job::Kind::Finish => {
                 let params = finishing(operation, tool);
@@ -307,6 +316,9 @@ pub fn programs(
         let number = planned.programs.len() as u32 + 1;
         let press = Press { job, shop, tile, dialect, folder, progress };
         planned.programs.extend(press.print(index, number, &path)?);
+    }
+    if let (true, Some(idle)) = (planned.programs.is_empty(), idle) {
+        return Err(idle);
     }
     if job.operations.iter().any(|operation| operation.kind == job::Kind::Rest) {
         // What passes leave that are only here and there is not worked out.

@@ -9,7 +9,7 @@ use super::shop::Shop;
 use super::{Error, WITHIN, light, pages, plan};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{Figures, Tally};
-use crate::job::{Form, Job};
+use crate::job::{Form, Job, Kind};
 use crate::report::cavity_list::{self, TileCavities};
 use crate::report::picture::{Caption, write_png};
 use crate::report::{self, Bounds, Fidelity, Finding, GougeBudget, Report, Severity, finding};
@@ -163,8 +163,12 @@ pub(super) fn of_tile(
         found.push(finding(Severity::Warning, "undercut", message).on(&name));
     }
     for index in &result.posts[0].left_out {
+        let why = match shop.kinds[*index] {
+            Kind::Rough => "no metal stands over its stock_to_leave_mm where it can get",
+            _ => "the cutters before leave no more than its leftover_mm",
+        };
         let message = format!(
-            "operation {} ({}, {}) has nothing to cut: the cutters before leave no more than its leftover_mm",
+            "operation {} ({}, {}) has nothing to cut: {why}",
             index + 1,
             shop.kinds[*index].word(),
             shop.tools[*index].name
