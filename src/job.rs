@@ -3,6 +3,7 @@
 
 mod operation;
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -230,6 +231,8 @@ pub enum Error {
     Source { path: String, found: usize },
     #[error("{path}: [part] {key} goes with {with} only; hint: {hint}")]
     Misplaced { path: String, key: &'static str, with: &'static str, hint: &'static str },
+    #[error("{path}:{line}: {key} = \"{file}\" {problem}; hint: a path is taken from the job's folder")]
+    File { path: String, line: usize, key: &'static str, file: String, problem: String },
     #[error("{path}: no [[operation]]; hint: a job needs at least one, see samples/quickstart/job.toml")]
     NoOperation { path: String },
     #[error("{path}:{line}: operation {number} ({kind}) {problem}; hint: {hint}")]
@@ -254,9 +257,29 @@ impl Job {
         let folder = path.parent().unwrap_or(Path::new(""));
         job.name = name_of(path);
         let part = &mut job.part;
-        let files = [&mut part.screen, &mut part.design, &mut part.mesh, &mut part.heights];
-        for file in files.into_iter().chain([&mut part.elevation, &mut job.tools.library]).flatten() {
-            *file = folder.join(&*file);
+        let files = [
+            ("part.screen", &mut part.screen),
+            ("part.design", &mut part.design),
+            ("part.mesh", &mut part.mesh),
+            ("part.heights", &mut part.heights),
+            ("part.elevation", &mut part.elevation),
+            ("tools.library", &mut job.tools.library),
+        ];
+        for (key, file) in files {
+            let Some(file) = file else { continue };
+            let resolved = folder.join(&*file);
+            let problem = match std::fs::metadata(&resolved) {
+                Err(error) if error.kind() == ErrorKind::NotFound => Some("is not there".into()),
+                Err(error) => Some(format!("cannot be read: {error}")),
+                Ok(found) if found.is_dir() => Some("is a folder".into()),
+                Ok(_) => None,
+            };
+            if let Some(problem) = problem {
+                let (path, line) = (source.path().into(), source.line_of(key));
+                let file = file.display().to_string();
+                return Err(Error::File { path, line, key, file, problem });
+            }
+            *file = resolved;
         }
         Ok(job)
     }

@@ -4,6 +4,9 @@
 use super::ends::{Measure, weights};
 use super::funnel::Vertex;
 
+/// What is steeper, as a slope, is no mirror: a wall between cells of a tile that lies level leans by its wedge.
+const WALL: f64 = 2.0;
+
 /// By how much mirrors are turned along the passes: each stretch of a pass that follows a plane, as a whole. Creases and
 /// fillets, where the cutter rolls over or rests on two faces, do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,6 +59,7 @@ impl Tilt {
     ) {
         let weights = weights(exact, measure);
         let plane = |i: usize| (0.5..1.5).contains(&weights[i]);
+        let wall = |i: usize| (exact[i + 1] - exact[i]).abs() * measure.unit_mm > WALL * measure.pitch_mm;
         let Some(&(_, start)) = vertices.first() else { return };
         let (mut first, mut above) = (0, f64::from(start) - exact[0]);
         for pair in vertices.windows(2) {
@@ -63,7 +67,7 @@ impl Tilt {
             let slope = f64::from(zb - za) / (b - a) as f64;
             let line = |i: usize| f64::from(za) + slope * (i - a) as f64;
             for i in a + 1..=b {
-                let on = plane(i - 1) && plane(i);
+                let on = plane(i - 1) && plane(i) && !wall(i - 1);
                 if !on || i + 1 == exact.len() {
                     let end = if on { i } else { i - 1 };
                     let length_mm = (end - first) as f64 * measure.pitch_mm;
@@ -102,6 +106,14 @@ mod tests {
         assert_eq!((worst.at_mm, worst.length_mm), ([20.0, 7.0], 0.4));
         let rms = tilt.rms_deg().unwrap();
         assert!((rms - worst.deg).abs() < 1e-12, "the only mirror is the worst: {rms}");
+    }
+
+    #[test]
+    fn a_leaning_wall_is_no_mirror() {
+        let exact: Vec<f64> = (0..41).map(|i| 2.5 * f64::from(i)).collect();
+        let mut tilt = Tilt::default();
+        tilt.add(&exact, &[(0, 0), (40, 101)], &MEASURE, |_| [0.0; 2]);
+        assert_eq!((tilt.rms_deg(), tilt.worst), (None, None));
     }
 
     #[test]
