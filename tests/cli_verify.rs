@@ -226,6 +226,8 @@ fn an_estimate_says_what_limits() {
     assert!((total - sum).abs() < 1e-9 && total > 150.0, "{report}");
     assert_eq!(report["limited_by"], "feed");
     assert_eq!(programs[1]["language"], "RML-1");
+    assert_eq!(programs[0]["notes"][0], "is G-code, roland-egx-600 reads rml1");
+    assert_eq!(programs[1]["notes"], serde_json::json!([]));
     assert_eq!(programs[1]["rapid_mm"], 5.1);
     assert_eq!(programs[1]["bounds_mm"]["z"], serde_json::json!([-0.1, 5.0]));
     screenmill()

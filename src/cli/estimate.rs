@@ -11,7 +11,9 @@ use screenmill::verify::{
 use serde_json::{Map, Value, json};
 
 use super::console::Console;
-use super::program::{Refused, bounds, clock, language, length, past_travel, reading_options, stream};
+use super::program::{
+    Refused, bounds, clock, language, length, past_travel, reading_options, stream, unread,
+};
 use super::{Common, Outcome, Refusal};
 
 /// Milling time of a job or of programs, with what limits it
@@ -75,6 +77,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         for past in past_travel(&one.extent, one.summary.language, &machine) {
             if past.harmless { one.notes.push(past.message) } else { one.errors.push(past.message) }
         }
+        one.notes.extend(unread(one.summary.language, &machine)?);
         runs &= one.errors.is_empty();
         total_s += one.timing.total_s;
         for (name, seconds) in one.timing.limits() {

@@ -32,6 +32,17 @@ fn open(path: &Path) -> Result<BufReader<File>, Refused> {
     Ok(BufReader::with_capacity(BUFFER, file))
 }
 
+/// Says so where no dialect of a machine is in a program's language.
+pub fn unread(language: Language, machine: &Machine) -> Result<Option<String>, Refusal> {
+    let rml = language == Language::Rml1;
+    for name in &machine.dialects {
+        if (Dialect::find(name, None)?.extension == "rml") == rml {
+            return Ok(None);
+        }
+    }
+    Ok(Some(format!("is {language}, {} reads {}", machine.name, machine.dialects.join(", "))))
+}
+
 /// What a text does not say of this machine: the unit of its RML-1, and how long a line its controller takes.
 pub fn reading_options(machine: &Machine) -> Result<Options, Refusal> {
     let dialects: Vec<Dialect> =

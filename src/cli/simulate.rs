@@ -15,7 +15,7 @@ use screenmill::verify::{
 use serde_json::{Value, json};
 
 use super::console::Console;
-use super::program::{bounds, clock, length, past_travel, read, reading_options};
+use super::program::{bounds, clock, length, past_travel, read, reading_options, unread};
 use super::{Common, Outcome, Refusal};
 
 /// A gouge past this fails.
@@ -185,6 +185,10 @@ fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal>
             findings.push(finding(Severity::Warning, "rapid-below-top", message).at(&rapid.from_mm));
         }
         if let Some(machine) = &machine {
+            if let Some(unread) = unread(program.reading.summary.language, machine)? {
+                let message = format!("{} {unread}", program.file);
+                findings.push(finding(Severity::Warning, "language", message));
+            }
             program.travel(machine, &mut findings);
             program.too_fast(machine, &feeds[index], &mut findings);
         }

@@ -132,7 +132,7 @@ fn notes(operation: &Operation) -> Vec<(&'static str, String)> {
         ));
     }
     if operation.kind == Kind::Outline {
-        notes.push(("air", "runs round the tile, then round all that is cut; spindle off".into()));
+        notes.push(("air", "runs round the tile, then round all that is cut, spindle off".into()));
     }
     notes
 }

@@ -151,8 +151,9 @@ pub fn of_wear(shop: &Shop, program: &Program, cut: &ProgramCut) -> Vec<Remark> 
         && bite.depth_mm > most_mm + BITE_MM
     {
         let message = format!(
-            "{} bites {:.3} mm deep at once, its max_depth_mm is {most_mm}; hint: a semi-finish (stock_to_leave_mm) before it that leaves less",
-            tool.name, bite.depth_mm
+            "{} bites {} mm deep at once, its max_depth_mm is {most_mm}; hint: a semi-finish (stock_to_leave_mm) before it that leaves less",
+            tool.name,
+            shown(bite.depth_mm, most_mm)
         );
         found.push(Remark::new(Severity::Warning, "bite", Some(bite.line), message));
     }
