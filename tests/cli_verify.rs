@@ -238,6 +238,17 @@ fn an_estimate_says_what_limits() {
         .stdout(
             predicate::str::contains("cutting").and(predicate::str::contains("verify against your machine")),
         );
+    // At 10 mm/s and 500 mm/s2: 10 s and the two ramps.
+    let short = "G21 G90\nM3 S9000\nG1 X100 F600\nM2\n";
+    std::fs::write(dir.path().join("short.ngc"), short).expect("a program");
+    screenmill()
+        .current_dir(dir.path())
+        .args(["estimate", "short.ngc", "--machine", "linuxcnc-mill"])
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("10.0 s cutting 100.0 mm").and(predicate::str::contains(
+            "line 3: cuts before it has positioned, it is taken to start at its zero",
+        )));
     let far = "G21 G90\nM3 S9000\nG0 Z5\nG0 X0 Y0\nG1 Z-1 F80\nX900\nG0 Z5\nM2\n";
     std::fs::write(dir.path().join("far.ngc"), far).expect("a program");
     screenmill()

@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let name = arguments.machine.as_deref().ok_or(Misused::NoMachine)?;
     let machine = Machine::find(name, None)?;
     let kinematics = Kinematics::from(&machine);
-    let options = reading_options(&machine)?;
+    let options = Options { from_zero: true, ..reading_options(&machine)? };
     let mut total_s = 0.0;
     let mut limits: Vec<(&'static str, f64)> = Vec::new();
     let mut programs = Vec::new();

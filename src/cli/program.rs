@@ -54,6 +54,7 @@ pub fn reading_options(machine: &Machine) -> Result<Options, Refusal> {
     Ok(Options {
         rml_unit_mm: rml.map_or(default.rml_unit_mm, |dialect| dialect.unit_mm),
         line: gcode.map(line_limit),
+        from_zero: false,
     })
 }
 

@@ -176,7 +176,7 @@ fn measured(
     };
     let mut text = Vec::new();
     post::write(&program, dialect, machine, &mut text)?;
-    let reading = Reading::of(&text, &Options { rml_unit_mm: dialect.unit_mm, line: None })?;
+    let reading = Reading::of(&text, &Options { rml_unit_mm: dialect.unit_mm, ..Options::default() })?;
     let expected_s = verify::time(&reading, &Kinematics::from(machine)).total_s;
     Ok(Measured { name, what, text, expected_s, reading })
 }

@@ -86,7 +86,7 @@ impl Press<'_> {
         out.flush().map_err(output)?;
         self.progress.begin("read back", 1);
         let open = File::open(&path).map_err(output)?;
-        let options = verify::Options { rml_unit_mm: self.dialect.unit_mm, line: None };
+        let options = verify::Options { rml_unit_mm: self.dialect.unit_mm, ..verify::Options::default() };
         let reading = Reading::from(&mut BufReader::with_capacity(1 << 20, open), &options)
             .map_err(|source| Error::ReadBack { path: file.clone(), source })?;
         let extent = reading.extent();

@@ -82,6 +82,8 @@ pub enum Note {
     SpindleOn { line: u32 },
     /// The first line that its controller may not take whole.
     LongLine { line: u64, column: u64, most: usize },
+    /// The first feed motion comes before a position that the text names.
+    FromZero { line: u32 },
     /// Some controllers count P in milliseconds.
     LongDwell { line: u32, seconds: f64 },
 }
@@ -103,6 +105,9 @@ impl fmt::Display for Note {
                     f,
                     "line {line}, column {column}: longer than {most} bytes, which no source confirms this controller takes"
                 )
+            }
+            Note::FromZero { line } => {
+                write!(f, "line {line}: cuts before it has positioned, it is taken to start at its zero")
             }
             Note::LongDwell { line, seconds } => {
                 write!(
@@ -131,6 +136,9 @@ pub struct Options {
     pub rml_unit_mm: f64,
     /// What its controller takes of a line of G-code; None where it is not known which one reads it.
     pub line: Option<LineLimit>,
+    /// G-code that cuts before it has positioned is taken to start at its zero, and a note says so. Enough for its
+    /// time; a judge must know where the cutter is, and such a program is refused to it.
+    pub from_zero: bool,
 }
 
 /// How long a line of G-code may be.
@@ -145,7 +153,7 @@ pub struct LineLimit {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { rml_unit_mm: 0.01, line: None }
+        Options { rml_unit_mm: 0.01, line: None, from_zero: false }
     }
 }
 

@@ -24,6 +24,8 @@ const LONG_DWELL_S: f64 = 120.0;
 /// What a block leaves behind for the next.
 struct Modal {
     at_mm: [f64; 3],
+    /// The axes are taken to stand at 0 until they are named.
+    from_zero: bool,
     motion: Option<u16>,
     plane: u16,
     unit_mm: f64,
@@ -41,6 +43,7 @@ type Sink<'a> = dyn FnMut(&Event) -> Result<(), Error> + 'a;
 pub(super) fn read(source: &mut dyn BufRead, options: &Options, each: &mut Sink) -> Result<Summary, Error> {
     let mut modal = Modal {
         at_mm: [f64::NAN; 3],
+        from_zero: options.from_zero,
         motion: None,
         plane: 170,
         unit_mm: 1.0,
@@ -297,6 +300,7 @@ impl Modal {
 
     /// G28, G30: a rapid through the target to the machine's home, which the text does not place.
     fn go_home(&mut self, block: &mut Block, line: u32, each: &mut Sink) -> Result<(), Error> {
+        self.from_zero = false;
         let named = [b'X', b'Y', b'Z'].map(|letter| block.has(letter));
         let through = self.target(block)?;
         if (0..3).any(|axis| named[axis] && through[axis] != self.at_mm[axis]) {
@@ -309,6 +313,7 @@ impl Modal {
 
     /// G53 G0: the axes named go where only the machine knows.
     fn leave(&mut self, block: &mut Block, line: u32, each: &mut Sink) -> Result<(), Error> {
+        self.from_zero = false;
         let named = [b'X', b'Y', b'Z'].map(|letter| block.has(letter));
         self.target(block)?;
         let to = std::array::from_fn(|axis| if named[axis] { f64::NAN } else { self.at_mm[axis] });
@@ -323,6 +328,13 @@ impl Modal {
         each: &mut Sink,
     ) -> Result<(), Error> {
         let at = block.first_place(b"XYZIJKR");
+        if self.from_zero && self.motion.is_some_and(|motion| motion != 0) {
+            self.from_zero = false;
+            if self.at_mm.iter().any(|mm| mm.is_nan()) {
+                notes.push(Note::FromZero { line });
+                self.rapid(self.at_mm.map(|mm| if mm.is_nan() { 0.0 } else { mm }), line, each)?;
+            }
+        }
         let start = self.at_mm;
         let target = self.target(block)?;
         let Some(motion) = self.motion else {
