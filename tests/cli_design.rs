@@ -198,14 +198,21 @@ fn what_is_no_file_is_not_replaced_by_one() {
 }
 
 #[test]
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 fn an_interrupted_design_leaves_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = coarse(folder.path(), "facets = 200", "facets = 3000");
+    for signal in ["-INT", "-TERM"] {
+        ends_with_nothing(&scene, signal);
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn ends_with_nothing(scene: &str, signal: &str) {
     let out = tempfile::tempdir().expect("a folder");
     let [npz, stl] = ["a.npz", "a.stl"].map(|name| out.path().join(name));
     let program = std::process::Command::new(assert_cmd::cargo::cargo_bin("screenmill"))
-        .args(["design", &scene, "--quiet", "--out"])
+        .args(["design", scene, "--quiet", "--out"])
         .arg(&npz)
         .arg("--stl")
         .arg(&stl)
@@ -215,7 +222,7 @@ fn an_interrupted_design_leaves_nothing() {
     while is_empty(out.path()) {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
-    let kill = std::process::Command::new("kill").args(["-INT", &program.id().to_string()]).status();
+    let kill = std::process::Command::new("kill").args([signal, &program.id().to_string()]).status();
     assert!(kill.expect("sent").success());
     let ended = program.wait_with_output().expect("ended");
     assert_eq!(ended.status.code(), Some(2));

@@ -21,10 +21,13 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// unfinished outputs are removed either way.
 pub fn listen_for_interrupt() -> Result<(), ctrlc::Error> {
     // A file that grows past `ulimit -f` is a disk that is full, told and cleaned up, and no reason to be killed.
+    // A polite kill is taken as Ctrl-C; ctrlc's own way would also undo `nohup`.
     #[cfg(target_os = "linux")]
-    // SAFETY: nothing else in the program handles this signal, and ignoring it runs no code.
+    // SAFETY: nothing else in the program handles these signals; ignoring one runs no code, and raise may be
+    // called in a handler.
     unsafe {
         libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+        libc::signal(libc::SIGTERM, interrupt as *const () as libc::sighandler_t);
     }
     ctrlc::set_handler(|| {
         INTERRUPTED.store(true, Ordering::SeqCst);
@@ -36,6 +39,14 @@ pub fn listen_for_interrupt() -> Result<(), ctrlc::Error> {
         eprintln!("error: {}", screenmill::pipeline::Error::Interrupted);
         std::process::exit(2);
     })
+}
+
+#[cfg(target_os = "linux")]
+extern "C" fn interrupt(_signal: libc::c_int) {
+    // SAFETY: raise is safe in a handler.
+    unsafe {
+        libc::raise(libc::SIGINT);
+    }
 }
 
 /// Whether the work should end at the next safe place.
