@@ -29,7 +29,7 @@ impl Controller {
             tolerance,
             merge: 0.0,
             chain: Chain { from: at, ..Chain::default() },
-            queue: VecDeque::with_capacity(3 * (limits.depth + 8)),
+            queue: VecDeque::with_capacity(limits.depth + 8),
             cycles: Cycles::default(),
         }
     }

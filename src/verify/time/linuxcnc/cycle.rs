@@ -15,23 +15,24 @@ impl Controller {
     /// One cycle of the servo loop, or up to `most` at once while nothing changes.
     pub(super) fn cycle(&mut self, most: u64) {
         let limits = self.limits;
-        let queue = self.queue.make_contiguous();
-        let Some((head, rest)) = queue.split_first_mut() else { return };
+        let mut segments = self.queue.iter_mut();
+        let Some(head) = segments.next() else { return };
+        let (mut next, after) = (segments.next(), segments.next());
         activate(head, &limits);
         let mut cycles = 1;
         if head.ending.is_some() {
-            hand_over(head, rest, &limits);
+            hand_over(head, next, after.as_deref(), &limits);
         } else {
             head.period = limits.period;
-            let bounds = Bounds::of(head, rest.first(), &limits);
+            let bounds = Bounds::of(head, next.as_deref(), &limits);
             cycles += cruise(head, &bounds, &limits, most - 1);
             if !head.ramp {
                 cycles += speed_up(head, &bounds, &limits, most - cycles);
-                cycles += slow_down(head, rest, &bounds, &limits, most - cycles);
+                cycles += slow_down(head, next.as_deref_mut(), &bounds, &limits, most - cycles);
             }
             step(head, &bounds, &limits);
-            if head.end == End::Parabola {
-                parabola(head, rest, &limits);
+            if let (End::Parabola, Some(next)) = (head.end, next) {
+                parabola(head, next, &limits);
             }
         }
         if head.rapid {
@@ -140,7 +141,13 @@ fn speed_up(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> 
 /// Runs whole cycles of braking evenly. Each takes `gain` off the speed: with h half of it, (v' + h)^2 = e^2 + a (2 l - v T) + h^2
 /// and l' = l - (v + v') T / 2 give (v'' + h)^2 = (v' - h)^2. While a parabola hands over, only as long as the next segment
 /// speeds up, which takes part.
-fn slow_down(head: &mut Segment, rest: &mut [Segment], bounds: &Bounds, limits: &Limits, most: u64) -> u64 {
+fn slow_down(
+    head: &mut Segment,
+    next: Option<&mut Segment>,
+    bounds: &Bounds,
+    limits: &Limits,
+    most: u64,
+) -> u64 {
     let &Bounds { end, asked, along } = bounds;
     let gain = along * limits.period;
     let half = 0.5 * gain;
@@ -151,7 +158,7 @@ fn slow_down(head: &mut Segment, rest: &mut [Segment], bounds: &Bounds, limits: 
     }
     let mut lowest = end;
     if head.end == End::Parabola && !head.handing_over {
-        let Some(next) = rest.first() else { return 0 };
+        let Some(next) = &next else { return 0 };
         lowest = lowest.max(parabola_begins(head, next, asked, target(next, limits)));
     }
     let cycles = (head.speed - lowest) / gain - 2.0;
@@ -160,7 +167,7 @@ fn slow_down(head: &mut Segment, rest: &mut [Segment], bounds: &Bounds, limits: 
     }
     let mut cycles = (cycles as u64).min(most);
     if head.handing_over {
-        let Some(next) = rest.first_mut() else { return 0 };
+        let Some(next) = next else { return 0 };
         cycles = speed_up(next, &Bounds::of(next, None, limits), limits, cycles);
     }
     head.progress += cycles as f64 * limits.period * (head.speed - half * cycles as f64);
@@ -277,24 +284,23 @@ fn look_for_end(segment: &mut Segment, end: f64, along: f64, limits: &Limits) {
 }
 
 /// The cycle in which one segment ends and the next begins.
-fn hand_over(head: &mut Segment, rest: &mut [Segment], limits: &Limits) {
+fn hand_over(head: &mut Segment, next: Option<&mut Segment>, after: Option<&Segment>, limits: &Limits) {
     if head.done {
         return;
     }
     let Some(ending) = head.ending else { return };
     head.progress = head.length;
     head.done = true;
-    let Some((next, after)) = rest.split_first_mut() else { return };
+    let Some(next) = next else { return };
     if head.end == End::Tangent {
         next.period = limits.period - ending.time;
         next.speed = ending.speed;
     }
-    step(next, &Bounds::of(next, after.first(), limits), limits);
+    step(next, &Bounds::of(next, after, limits), limits);
 }
 
 /// Begins the next segment while this one brakes.
-fn parabola(head: &mut Segment, rest: &mut [Segment], limits: &Limits) {
-    let Some(next) = rest.first_mut() else { return };
+fn parabola(head: &mut Segment, next: &mut Segment, limits: &Limits) {
     if !head.handing_over && head.braking {
         let begins = parabola_begins(head, next, target(head, limits), target(next, limits));
         head.handing_over = head.speed < begins;

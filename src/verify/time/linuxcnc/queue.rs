@@ -46,11 +46,12 @@ impl Controller {
 
 /// Finds how fast each of the last segments may end, from the back (tp.c: tpRunOptimization).
 fn brake_backward(queue: &mut VecDeque<Segment>, limits: &Limits) {
-    let segments = queue.make_contiguous();
     let (mut peaks, mut stops) = (0, 0);
-    for index in (1..segments.len()).rev().take(limits.depth + 1) {
-        let (before, rest) = segments.split_at_mut(index);
-        let (Some(before), Some(this)) = (before.last_mut(), rest.first_mut()) else { return };
+    let mut segments = queue.iter_mut().rev();
+    let Some(mut after) = segments.next() else { return };
+    for before in segments.take(limits.depth + 1) {
+        let this = std::mem::replace(&mut after, before);
+        let before = &mut *after;
         if before.end != End::Tangent {
             stops += 1;
             if stops > 1 {
