@@ -20,12 +20,13 @@ const OTHERS: &str = "name = \"roland-egx-600\"\npost = [\"rml1\", \"linuxcnc\"]
 
 #[test]
 fn simulate_finds_the_figures_of_the_report() {
-    let cases: [&[(&str, &str)]; 5] = [
+    let cases: [&[(&str, &str)]; 6] = [
         &[],
         &[("name = \"linuxcnc-mill\"", OTHERS)],
         &[("min_floor_mm = 2", "min_floor_mm = 2\nz_zero = \"part-top\"")],
         &[("step_mm = 0.02", "step_mm = 0.02\nform = \"die\"")],
         &[("step_mm = 0.02", "step_mm = 0.02\nlevel = \"plane\"")],
+        &[("step_mm = 0.02", "step_mm = 0.02\nedge = \"wall\"")],
     ];
     for changes in cases {
         let bench = Bench::with(changes);
@@ -33,9 +34,11 @@ fn simulate_finds_the_figures_of_the_report() {
         let report = bench.json("out/report.json");
         bench.run(&printed(&output)).success();
         let again = bench.json("out/simulate-r0c0/report.json");
-        for key in ["gouge_max_mm", "excess_max_mm", "deviation_p50_mm", "deviation_p99_mm"] {
+        for key in ["gouge_max_mm", "excess_max_mm", "deviation_p50_mm", "deviation_p99_mm", "normal_p95_deg"]
+        {
             let (told, found) = (figure(&report, key), figure(&again, key));
-            assert!((told - found).abs() < 2e-4, "{changes:?} {key}: {told} and {found}");
+            let most = if key.ends_with("deg") { 0.01 } else { 2e-4 };
+            assert!((told - found).abs() < most, "{changes:?} {key}: {told} and {found}");
         }
     }
 }

@@ -228,14 +228,22 @@ impl Case<'_> {
             let map = block.pictures.light.as_mut().map(|maps| &mut maps[0]);
             sight.add(&mut block.light_designed, &near, window, lattice.step_mm, map);
         }
+        // What stands around the tile, walls or a neighbour's design, is in no file beside the report: figures that
+        // leaned on it could not be found again from those.
+        let own = |heights: &Heights| {
+            let inside = heights.window.intersection(&lattice.window())?;
+            (inside != heights.window).then(|| heights.crop(inside))
+        };
+        let own_design = own(&near);
         for (post, programs) in self.posts.iter().enumerate() {
             let stock = self.blank.heights(self.swept_window(window, halo as i64), lattice.step_mm, 0.0);
             let swept = verify::sweep(stock, lattice.step_mm, 0.0, programs);
             let machined = swept.heights.crop(window.grown(halo));
             let mut tally = Tally::new(self.tally);
+            let own_machined = own(&machined);
             let layers = Layers {
-                design: &near,
-                machined: &machined,
+                design: own_design.as_ref().unwrap_or(&near),
+                machined: own_machined.as_ref().unwrap_or(&machined),
                 cavity: (!self.cutters.is_empty()).then_some(&block.cavity),
                 passes: passes.as_ref(),
             };
