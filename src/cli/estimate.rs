@@ -151,7 +151,7 @@ fn job(path: &Path, common: &Common) -> Result<Outcome, Refusal> {
             );
         }
         if let Some(most) = estimated.hours_max.filter(|_| over) {
-            println!("{hours:.1} machine hours, {most} are allowed");
+            println!("{hours:.2} machine hours, {most} are allowed");
         }
     }
     Ok(if over { Outcome::Found } else { Outcome::Within })

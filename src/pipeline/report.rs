@@ -351,7 +351,7 @@ fn of_limits(job: &Job, report: &Report, figures: &Figures) -> Vec<Finding> {
     if let Some(most) = limits.hours_max
         && hours > most
     {
-        miss("hours", format!("{hours:.1} machine hours, {most} are allowed"));
+        miss("hours", format!("{hours:.2} machine hours, {most} are allowed"));
     }
     found
 }
