@@ -95,7 +95,7 @@ pub fn names(kind: Kind) -> impl Iterator<Item = &'static str> {
 /// The text of the file that `name` means to a job in `folder` (the current one if None).
 pub fn find(kind: Kind, name: &str, folder: Option<&Path>) -> Result<Source, Error> {
     let folder = folder.unwrap_or(Path::new(""));
-    if name.contains(['/', '\\']) || name.ends_with(".toml") {
+    if !is_name(name) {
         return Ok(Source::read(&folder.join(name))?);
     }
     let beside = folder.join(format!("{name}.toml"));
@@ -110,6 +110,11 @@ pub fn find(kind: Kind, name: &str, folder: Option<&Path>) -> Result<Source, Err
             Err(Error::Unknown { noun: kind.noun(), name: shown, hint: nearest(name, &known) })
         }
     }
+}
+
+/// Whether it is a name, and no path.
+pub fn is_name(name: &str) -> bool {
+    !name.contains(['/', '\\']) && !name.ends_with(".toml")
 }
 
 /// Whether a file beside the job is of this kind: `linuxcnc.toml` may be a dialect or a job.

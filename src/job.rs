@@ -10,6 +10,7 @@ use serde::Deserialize;
 
 pub use operation::{Face, Kind, Operation, Pattern, Place};
 
+use crate::catalogue;
 use crate::settings::{self, Source};
 
 /// JOB.toml as written. Paths are relative to the job's folder until [`Job::read`] resolves them.
@@ -233,6 +234,8 @@ pub enum Error {
     Misplaced { path: String, key: &'static str, with: &'static str, hint: &'static str },
     #[error("{path}:{line}: {key} = \"{file}\" {problem}; hint: a path is taken from the job's folder")]
     File { path: String, line: usize, key: &'static str, file: String, problem: String },
+    #[error("{path}:{line}: {source}")]
+    Named { path: String, line: usize, source: catalogue::Error },
     #[error("{path}: no [[operation]]; hint: a job needs at least one, see samples/quickstart/job.toml")]
     NoOperation { path: String },
     #[error("{path}:{line}: operation {number} ({kind}) {problem}; hint: {hint}")]
@@ -267,6 +270,9 @@ impl Job {
         ];
         for (key, file) in files {
             let Some(file) = file else { continue };
+            if key == "tools.library" && catalogue::is_name(&file.display().to_string()) {
+                continue;
+            }
             let resolved = folder.join(&*file);
             let problem = match std::fs::metadata(&resolved) {
                 Err(error) if error.kind() == ErrorKind::NotFound => Some("is not there".into()),
@@ -281,7 +287,26 @@ impl Job {
             }
             *file = resolved;
         }
+        job.check_names(&source, folder)?;
         Ok(job)
+    }
+
+    /// Refuses names of machine, fixture and posts that nothing has.
+    fn check_names(&self, source: &Source, folder: &Path) -> Result<(), Error> {
+        let named = [
+            ("machine.name", catalogue::Kind::Machine, &self.machine.name),
+            ("machine.fixture", catalogue::Kind::Fixture, &self.machine.fixture),
+        ];
+        let posts =
+            self.machine.post.iter().flatten().map(|post| ("machine.post", catalogue::Kind::Dialect, post));
+        for (key, kind, name) in named.into_iter().chain(posts) {
+            if let Err(unknown @ catalogue::Error::Unknown { .. }) = catalogue::find(kind, name, Some(folder))
+            {
+                let (path, line) = (source.path().into(), source.line_of(key));
+                return Err(Error::Named { path, line, source: unknown });
+            }
+        }
+        Ok(())
     }
 
     fn check(&self, source: &Source) -> Result<(), Error> {

@@ -250,8 +250,8 @@ fn passes(
         progress(first as f64 / passes as f64);
     }
     let mut path = pen.finish();
-    // Positions of a slanted pass on a coarse grid stand so far to both sides of its line that their own heights
-    // zigzag: no slope to compare with.
+    // Vertices of a slanted pass on a coarse grid stand beside its line, which turns a mirror too: heights along the
+    // line do not tell all.
     let straight = layout.aside_mm() <= STRAIGHT * layout.pitch_mm();
     path.tilt = (params.stock_to_leave_mm == 0.0 && straight).then_some(tilt);
     Ok(path)
