@@ -47,7 +47,18 @@ pub struct Arguments {
     sampled: bool,
 }
 
+#[derive(Debug, thiserror::Error)]
+#[error("{path} is named for two of the files; hint: a name for each of --cl, --closing and --residual")]
+struct NamedTwice {
+    path: String,
+}
+
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
+    let named: Vec<&PathBuf> =
+        [&arguments.cl, &arguments.closing, &arguments.residual].into_iter().flatten().collect();
+    if let Some(nth) = (1..named.len()).find(|nth| named[..*nth].contains(&named[*nth])) {
+        return Err(NamedTwice { path: named[nth].display().to_string() }.into());
+    }
     let every = arguments.every;
     if every == 0 {
         return Err(compensation::Error::Every { every }.into());
