@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::path::Path;
 
+use npyz::WriterBuilder;
 use screenmill::grid::{Heights, Window};
 use screenmill::surface::{HeightWriter, Options, Surface, open};
 
@@ -215,4 +216,25 @@ fn every_solid_of_a_text_is_read_however_it_is_spelt() {
             assert_eq!(*z, if k % 14 < 6 { -1.5 } else { 1.5 }, "{k}");
         }
     }
+}
+
+/// numpy.save of a transposed array.
+#[test]
+fn an_array_saved_by_columns_is_the_same_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let relief = relief();
+    let path = folder.path().join("t.npy");
+    let file = File::create(&path).unwrap();
+    let mut writer = npyz::WriteOptions::new()
+        .default_dtype()
+        .order(npyz::Order::Fortran)
+        .shape(&[ROWS as u64, COLUMNS as u64])
+        .writer(file)
+        .begin_nd()
+        .unwrap();
+    let by_columns = (0..COLUMNS).flat_map(|column| (0..ROWS).map(move |row| row * COLUMNS + column));
+    writer.extend(by_columns.map(|k| relief.z_mm[k])).unwrap();
+    writer.finish().unwrap();
+    let (_, found) = read(&path, &Options { pixel_mm: Some(0.02), ..Options::at_step(0.02) });
+    assert_same(&found, &relief);
 }
