@@ -25,42 +25,53 @@ impl Histogram {
     pub fn add(&mut self, quanta: f64) {
         // By way of i64: plain x86-64 has no conversion to unsigned.
         let bin = bin_of((quanta + 0.5).max(0.0) as i64 as u64);
-        let page = bin / PAGE;
-        if page >= self.pages.len() {
-            self.pages.resize(page + 1, None);
-        }
-        self.pages[page].get_or_insert_with(|| vec![0; PAGE].into_boxed_slice())[bin % PAGE] += 1;
+        self.page(bin / PAGE)[bin % PAGE] += 1;
         self.count += 1;
     }
 
-    /// Counts as [`Histogram::add`] does, many at once.
+    /// Counts as [`Histogram::add`] does, many at once. What rounds to 0 costs next to nothing: most of a closing is
+    /// the design itself, and one bin raised again and again waits for itself.
     pub fn add_all(&mut self, quanta: &[f64]) {
-        let mut bins = [0u32; TOGETHER];
+        let (mut bins, mut above) = ([0u32; TOGETHER], [0u8; TOGETHER]);
         for quanta in quanta.chunks(TOGETHER) {
             for (bin, quanta) in bins.iter_mut().zip(quanta) {
                 // What is not a number becomes 0.
                 *bin = (quanta + 0.5).clamp(0.0, PAST_LINEAR) as i32 as u32;
             }
-            let mut at = 0;
-            while at < quanta.len() {
-                let page = bins[at] as usize / PAGE;
+            let mut kept = 0;
+            for (k, &bin) in bins[..quanta.len()].iter().enumerate() {
+                above[kept] = k as u8;
+                kept += usize::from(bin != 0);
+            }
+            let zeros = quanta.len() - kept;
+            if zeros > 0 {
+                self.page(0)[0] += zeros as u64;
+                self.count += zeros as u64;
+            }
+            let mut above = above[..kept].iter().map(|k| usize::from(*k)).peekable();
+            while let Some(k) = above.next() {
+                let page = bins[k] as usize / PAGE;
                 if page >= PAST_LINEAR as usize / PAGE {
-                    self.add(quanta[at]);
-                    at += 1;
+                    self.add(quanta[k]);
                     continue;
                 }
-                if page >= self.pages.len() {
-                    self.pages.resize(page + 1, None);
+                let counts = self.page(page);
+                counts[bins[k] as usize % PAGE] += 1;
+                let mut counted = 1;
+                while let Some(k) = above.next_if(|&k| bins[k] as usize / PAGE == page) {
+                    counts[bins[k] as usize % PAGE] += 1;
+                    counted += 1;
                 }
-                let counts = self.pages[page].get_or_insert_with(|| vec![0; PAGE].into_boxed_slice());
-                let first = at;
-                while at < quanta.len() && bins[at] as usize / PAGE == page {
-                    counts[bins[at] as usize % PAGE] += 1;
-                    at += 1;
-                }
-                self.count += (at - first) as u64;
+                self.count += counted;
             }
         }
+    }
+
+    fn page(&mut self, page: usize) -> &mut [u64] {
+        if page >= self.pages.len() {
+            self.pages.resize(page + 1, None);
+        }
+        self.pages[page].get_or_insert_with(|| vec![0; PAGE].into_boxed_slice())
     }
 
     /// Takes over everything another one counted.

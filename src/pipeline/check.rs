@@ -14,7 +14,7 @@ use super::plan::TileSetup;
 use super::shop::Shop;
 use super::{Error, WITHIN, maps};
 use crate::compensation::{self, Tables};
-use crate::fidelity::light::LightTally;
+use crate::fidelity::light::{Known, LightTally};
 use crate::fidelity::{self, Layers, Tally};
 use crate::grid::{Heights, Window};
 use crate::job::Job;
@@ -279,10 +279,8 @@ impl Facts<'_> {
         let near = window.grown(halo);
         let around = surface.heights(near.grown(2 * reach), surface.top_mm())?;
         let design = around.crop(near);
-        let mut designed = LightTally::default();
-        if let Some(sight) = sight {
-            sight.add(&mut designed, &design, window, step_mm, None);
-        }
+        let room = sight.map(|sight| (sight.pose, sight.room()));
+        let known = room.as_ref().map(|(pose, room)| Known::new(&design, window, step_mm, pose, room));
         let mut reached = vec![0u16; near.samples()];
         let mut measured = Vec::new();
         for (bit, set) in sets.iter().enumerate() {
@@ -298,10 +296,7 @@ impl Facts<'_> {
             let cavity = compensation::residual(&closing, &design);
             let layers = Layers { design: &design, machined: &closing, cavity: Some(&cavity), passes: None };
             tally.add(window, layers)?;
-            let mut light = LightTally::default();
-            if let Some(sight) = sight {
-                sight.add(&mut light, &closing, window, step_mm, None);
-            }
+            let light = known.as_ref().map_or_else(LightTally::default, |known| known.with(&closing));
             measured.push(Measured { tally, light });
         }
         let mut counts = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
@@ -314,6 +309,7 @@ impl Facts<'_> {
                 }
             }
         }
+        let designed = known.map_or_else(LightTally::default, Known::into_light);
         Ok((measured, counts, designed))
     }
 

@@ -6,6 +6,8 @@
 //! differences at the raster step, for the design and for the cut alike.
 
 mod ground;
+mod known;
+mod lit;
 mod metal;
 mod planes;
 mod relief;
@@ -13,6 +15,7 @@ mod row;
 mod tally;
 mod view;
 
+pub use known::Known;
 pub use metal::Metal;
 pub use planes::{Plane, planes};
 pub use relief::{End, Relief};

@@ -1,6 +1,8 @@
 //! Which rays from a heightfield meet it again: a horizon that proves for most places that none does, and a
 //! march along the samples for the rest.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::grid::{Heights, Window};
@@ -119,6 +121,25 @@ impl<'a> Relief<'a> {
     #[inline]
     pub(super) fn clear(&self, column: usize, row: usize) -> f64 {
         self.patches[row / PATCH * self.across + column / PATCH].clear
+    }
+
+    /// Shows the columns of a row, of those given, at which rays have to climb faster here than in another relief of
+    /// the same window to be known to meet nothing; rows and columns count from the window's corner.
+    pub(super) fn harder(
+        &self,
+        than: &Relief,
+        row: usize,
+        columns: Range<usize>,
+        mut show: impl FnMut(Range<usize>),
+    ) {
+        let mut start = columns.start;
+        while start < columns.end {
+            let end = ((start / PATCH + 1) * PATCH).min(columns.end);
+            if self.clear(start, row) > than.clear(start, row) {
+                show(start..end);
+            }
+            start = end;
+        }
     }
 
     fn at(&self, column: i64, row: i64) -> f64 {

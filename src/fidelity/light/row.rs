@@ -22,6 +22,8 @@ pub(super) struct Chunk {
     /// Whether the sample was worked out; else it has no data beside it, or something may stand in a ray's way.
     pub done: [bool; CHUNK],
     clear2: [f64; CHUNK],
+    /// Samples from the first one on.
+    across: [f64; CHUNK],
     out: [[f64; CHUNK]; 3],
     turn: [[f64; CHUNK]; 3],
 }
@@ -38,6 +40,7 @@ impl Chunk {
             bin: [0; CHUNK],
             done: [false; CHUNK],
             clear2: zero,
+            across: zero,
             out: [zero; 3],
             turn: [zero; 3],
         }
@@ -56,24 +59,38 @@ impl Chunk {
         let window = heights.window;
         let (r, c) = ((row - window.row) as usize, (column - window.column) as usize);
         let line = |r: usize, c: usize| &heights.z_mm[r * window.columns + c..][..count];
-        let step_mm = relief.step_mm();
         for (k, clear2) in self.clear2[..count].iter_mut().enumerate() {
             let clear = relief.clear(c + k, r);
             *clear2 = clear * clear;
         }
-        let about = About {
-            place: [
-                (column as f64 + 0.5) * step_mm - stage.middle_mm.x,
-                (row as f64 + 0.5) * step_mm - stage.middle_mm.y,
-                -stage.middle_mm.z,
-            ],
-            step_mm,
-            projector: stage.projector_m,
-            metal: stage.metal.by_index(),
-            rotation: stage.rotation,
-        };
+        (0..count).for_each(|k| self.across[k] = k as f64);
         let rows = [line(r, c), line(r, c - 1), line(r, c + 1), line(r - 1, c), line(r + 1, c)];
-        widest(self, &rows, &about, outlines);
+        widest(self, &rows, &About::new(stage, relief.step_mm(), row, column), outlines);
+    }
+
+    /// As [`Chunk::fill`], for samples of a row that need not lie side by side.
+    pub fn gather(
+        &mut self,
+        (heights, relief, stage): (&Heights, &Relief, &Stage),
+        outlines: &[&[[DVec3; 2]]],
+        row: i64,
+        columns: &[i64],
+    ) {
+        let Some(&first) = columns.first() else { return };
+        let window = heights.window;
+        let r = (row - window.row) as usize;
+        let [below, here, above] = [row - 1, row, row + 1].map(|row| heights.row(row));
+        let mut five = [[0.0f32; CHUNK]; 5];
+        for (k, &column) in columns.iter().enumerate() {
+            let c = (column - window.column) as usize;
+            let clear = relief.clear(c, r);
+            self.clear2[k] = clear * clear;
+            self.across[k] = (column - first) as f64;
+            let samples = [here[c], here[c - 1], here[c + 1], below[c], above[c]];
+            five.iter_mut().zip(samples).for_each(|(line, z)| line[k] = z);
+        }
+        let rows = five.each_ref().map(|line| &line[..columns.len()]);
+        widest(self, &rows, &About::new(stage, relief.step_mm(), row, first), outlines);
     }
 }
 
@@ -84,6 +101,22 @@ struct About {
     projector: DVec3,
     metal: [[f64; 2]; 2],
     rotation: DMat3,
+}
+
+impl About {
+    fn new(stage: &Stage, step_mm: f64, row: i64, column: i64) -> About {
+        About {
+            place: [
+                (column as f64 + 0.5) * step_mm - stage.middle_mm.x,
+                (row as f64 + 0.5) * step_mm - stage.middle_mm.y,
+                -stage.middle_mm.z,
+            ],
+            step_mm,
+            projector: stage.projector_m,
+            metal: stage.metal.by_index(),
+            rotation: stage.rotation,
+        }
+    }
 }
 
 /// Runs [`work`] with the widest vectors that this processor has; the answer is the same for all.
@@ -119,7 +152,17 @@ fn widest(chunk: &mut Chunk, rows: &[&[f32]; 5], about: &About, outlines: &[&[[D
 fn work(chunk: &mut Chunk, rows: &[&[f32]; 5], about: &About, outlines: &[&[[DVec3; 2]]]) {
     let count = rows[0].len().min(CHUNK);
     let [here, left, right, below, above] = rows.map(|row| &row[..count]);
-    let Chunk { taken, reflected, met, bin, done, clear2, out: [ox, oy, oz], turn: [qx, qy, qz] } = chunk;
+    let Chunk {
+        taken,
+        reflected,
+        met,
+        bin,
+        done,
+        clear2,
+        across: samples,
+        out: [ox, oy, oz],
+        turn: [qx, qy, qz],
+    } = chunk;
     let per_mm = 0.5 / about.step_mm;
     let [[n, k], [constant, of_index]] = about.metal;
     let (nk, nk4) = (n * n - k * k, 4.0 * n * n * k * k);
@@ -130,7 +173,7 @@ fn work(chunk: &mut Chunk, rows: &[&[f32]; 5], about: &About, outlines: &[&[[DVe
     for at in 0..count {
         let zx = (f64::from(right[at]) - f64::from(left[at])) * per_mm;
         let zy = (f64::from(above[at]) - f64::from(below[at])) * per_mm;
-        let px = px0 + at as f64 * step_m;
+        let px = px0 + samples[at] * step_m;
         let pz = pz0 + f64::from(here[at]) * 1e-3;
         let (ix, iy, iz) = (p.x - px, p.y - py, p.z - pz);
         let dot = iz - ix * zx - iy * zy;

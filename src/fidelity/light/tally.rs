@@ -1,16 +1,5 @@
-use glam::DVec3;
-use rayon::prelude::*;
-
-use super::ground::Ground;
-use super::metal::draw;
-use super::row::Chunk;
-use super::view::{BINS, bin_of};
-use super::{End, Pose, Relief, Room, Stage, View};
-use crate::fidelity::pixels::{Line, Pixels, total};
-use crate::grid::{Heights, Window};
-
-/// Bounces that are followed; light that has not left by then is unresolved.
-const BOUNCES: u64 = 6;
+use super::View;
+use super::view::BINS;
 
 /// Bins across the hemisphere of all outgoing directions, by (o_x, o_y) from -1 to 1.
 pub const ROOM_BINS: usize = 200;
@@ -20,9 +9,6 @@ const FINE: usize = ROOM_BINS / BINS;
 
 /// Bins that the audience fills less than this are left out of the uniformity.
 const FILLED: f64 = 0.25;
-
-/// Rows per task; a constant, so that it is no part of how sums come about.
-const BAND_ROWS: usize = 256;
 
 /// Shares of the incident light; they sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,18 +23,18 @@ pub struct Shares {
 /// Sums of light over the samples seen so far.
 #[derive(Clone, Debug)]
 pub struct LightTally {
-    samples: u64,
+    pub(super) samples: u64,
     /// Samples that the projector does not reach.
-    shadowed: u64,
-    drawn: bool,
-    incident: f64,
-    on_audience: f64,
-    leak: f64,
-    absorbed: f64,
-    unresolved: f64,
+    pub(super) shadowed: u64,
+    pub(super) drawn: bool,
+    pub(super) incident: f64,
+    pub(super) on_audience: f64,
+    pub(super) leak: f64,
+    pub(super) absorbed: f64,
+    pub(super) unresolved: f64,
     /// Light by direction, [`ROOM_BINS`] squared: all that leaves, and what meets the audience.
-    room: Vec<f64>,
-    met: Vec<f64>,
+    pub(super) room: Vec<f64>,
+    pub(super) met: Vec<f64>,
 }
 
 impl Default for LightTally {
@@ -68,89 +54,7 @@ impl Default for LightTally {
     }
 }
 
-/// One band's sums, and its rows' light by pixels of the map if one is wanted.
-type Band = (LightTally, Vec<Line>);
-
 impl LightTally {
-    /// Adds the samples of `window`, and to a map of shares on the audience if there is one; `heights` covers it with a halo of one sample or more where there is data. Rays
-    /// are followed as far as `heights` reaches.
-    pub fn add(
-        &mut self,
-        heights: &Heights,
-        window: Window,
-        step_mm: f64,
-        pose: &Pose,
-        room: &Room,
-        mut map: Option<&mut Pixels>,
-    ) {
-        let relief = Relief::new(heights, step_mm, room.steepest);
-        let (columns, rows) = (window.columns as f64 * step_mm, window.rows as f64 * step_mm);
-        let finite = heights.z_mm.iter().copied().filter(|z| z.is_finite());
-        let (low, high) =
-            finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
-        if low > high {
-            return;
-        }
-        let corner = DVec3::new(window.column as f64, window.row as f64, 0.0) * step_mm;
-        let middle_mm = corner + 0.5 * DVec3::new(columns, rows, f64::from(low) + f64::from(high));
-        let within_mm = columns.hypot(rows) + f64::from(high) - f64::from(low);
-        let stage = Stage::new(room, pose, middle_mm, within_mm);
-        let ground = Ground { heights, step_mm };
-        let starts: Vec<i64> = (window.row..window.row_end()).step_by(BAND_ROWS).collect();
-        // One sample at a time where directions are drawn, or stand at a cell's centre.
-        let plain = room.metal.is_mirror() && room.far_field.is_none();
-        let outlines = if plain { stage.silhouette.outlines() } else { None };
-        let map_of = map.as_deref();
-        let bands: Vec<Band> = starts
-            .into_par_iter()
-            .map(|first| {
-                let mut tally = LightTally { drawn: !room.metal.is_mirror(), ..LightTally::default() };
-                let mut light = Vec::new();
-                let mut chunk = Chunk::new();
-                for row in first..(first + BAND_ROWS as i64).min(window.row_end()) {
-                    let mut line = map_of.map(|map| map.line(window));
-                    let mut column = window.column;
-                    while column < window.column_end() {
-                        let end = (column + Chunk::SAMPLES as i64).min(window.column_end());
-                        match &outlines {
-                            Some(outlines) if ground.surrounded(column, end, row) => {
-                                let count = (end - column) as usize;
-                                chunk.fill((heights, &relief, &stage), outlines, row, column, count);
-                                tally.chunk(
-                                    &chunk,
-                                    (&ground, &relief, &stage),
-                                    row,
-                                    column,
-                                    count,
-                                    &mut line,
-                                );
-                            }
-                            _ => {
-                                for column in column..end {
-                                    let light = tally.sample(&ground, &relief, &stage, column, row);
-                                    line.iter_mut().for_each(|line| line.add(column, light));
-                                }
-                            }
-                        }
-                        column = end;
-                    }
-                    light.extend(line);
-                }
-                (tally, light)
-            })
-            .collect();
-        let mut row = window.row;
-        for (tally, light) in &bands {
-            self.merge(tally);
-            for line in light {
-                if let Some(map) = map.as_deref_mut() {
-                    map.add(row, line);
-                }
-                row += 1;
-            }
-        }
-    }
-
     /// Adds another tally; the caller keeps the order of blocks so that sums are the same each run.
     pub fn merge(&mut self, other: &LightTally) {
         self.samples += other.samples;
@@ -169,104 +73,23 @@ impl LightTally {
         }
     }
 
-    /// Adds samples that were worked out together, and looks at the others by themselves.
-    fn chunk(
-        &mut self,
-        chunk: &Chunk,
-        (ground, relief, stage): (&Ground, &Relief, &Stage),
-        row: i64,
-        column: i64,
-        count: usize,
-        line: &mut Option<Line>,
-    ) {
-        let nothing = [0.0; Chunk::SAMPLES];
-        let (mut taken, mut reflected, mut arrived) = (nothing, nothing, nothing);
-        let mut done = 0;
-        for k in 0..count {
-            let on = chunk.done[k];
-            done += usize::from(on);
-            taken[k] = if on { chunk.taken[k] } else { 0.0 };
-            reflected[k] = if on { chunk.reflected[k] } else { 0.0 };
-            arrived[k] = if chunk.met[k] >= 0.0 { reflected[k] } else { 0.0 };
-        }
-        let [taken, reflected, arrived] = [&taken[..count], &reflected[..count], &arrived[..count]];
-        let [all, left, met] = [taken, reflected, arrived].map(total);
-        self.samples += done as u64;
-        self.incident += all;
-        self.absorbed += all - left;
-        self.on_audience += met;
-        self.leak += left - met;
-        // On one facet all light goes one way.
-        let mut k = 0;
-        while k < count {
-            let bin = chunk.bin[k];
-            let (mut left, mut met) = (0.0, 0.0);
-            while k < count && chunk.bin[k] == bin {
-                left += reflected[k];
-                met += arrived[k];
-                k += 1;
+    /// Takes samples out that are held, as `before`, and puts them in again as `after`.
+    pub(super) fn exchange(&mut self, before: &LightTally, after: &LightTally) {
+        self.samples = self.samples + after.samples - before.samples;
+        self.shadowed = self.shadowed + after.shadowed - before.shadowed;
+        let put = |sum: &mut f64, before: f64, after: f64| *sum = (*sum - before + after).max(0.0);
+        put(&mut self.incident, before.incident, after.incident);
+        put(&mut self.on_audience, before.on_audience, after.on_audience);
+        put(&mut self.leak, before.leak, after.leak);
+        put(&mut self.absorbed, before.absorbed, after.absorbed);
+        put(&mut self.unresolved, before.unresolved, after.unresolved);
+        let bins = |sums: &mut [f64], before: &[f64], after: &[f64]| {
+            for ((sum, before), after) in sums.iter_mut().zip(before).zip(after) {
+                put(sum, *before, *after);
             }
-            self.room[bin as usize] += left;
-            self.met[bin as usize] += met;
-        }
-        if let Some(line) = line {
-            line.add_run(column, taken, arrived);
-        }
-        if done < count {
-            for k in (0..count).filter(|k| !chunk.done[*k]) {
-                let light = self.sample(ground, relief, stage, column + k as i64, row);
-                line.iter_mut().for_each(|line| line.add(column + k as i64, light));
-            }
-        }
-    }
-
-    /// Follows the light of one sample; gives what fell on it and what of that reached the audience.
-    #[inline]
-    fn sample(&mut self, ground: &Ground, relief: &Relief, stage: &Stage, column: i64, row: i64) -> [f64; 2] {
-        let Some((p_mm, normal)) = ground.sample(column, row) else { return [0.0; 2] };
-        let mut place_m = stage.place_m(p_mm);
-        let mut i = (stage.projector_m - place_m).normalize();
-        let taken = i.dot(normal);
-        self.samples += 1;
-        if taken <= 0.0 || matches!(relief.end(column, row, i), End::At(..)) {
-            self.shadowed += 1;
-            return [0.0; 2];
-        }
-        self.incident += taken;
-        let (mut left, mut n) = (taken, normal.normalize());
-        let (mut column, mut row) = (column, row);
-        for bounce in 0..BOUNCES {
-            let way = stage.metal.scatter(i, n, i.dot(n), || draw(column, row, bounce));
-            self.absorbed += left * way.absorbed;
-            self.unresolved += left * way.masked;
-            left *= way.goes_on;
-            match relief.end(column, row, way.out) {
-                End::Clear => {
-                    let out = stage.rotation * way.out;
-                    let bin = bin_of(out.x, ROOM_BINS) + ROOM_BINS * bin_of(out.y, ROOM_BINS);
-                    self.room[bin] += left;
-                    if stage.silhouette.met(place_m, way.out) {
-                        self.on_audience += left;
-                        self.met[bin] += left;
-                        return [taken, left];
-                    }
-                    self.leak += left;
-                    return [taken, 0.0];
-                }
-                End::Unknown => break,
-                End::At(next_column, next_row) => {
-                    let Some((p_mm, normal)) = ground.sample(next_column, next_row) else { break };
-                    (i, n) = (-way.out, normal.normalize());
-                    if i.dot(n) <= 0.0 {
-                        break;
-                    }
-                    (column, row) = (next_column, next_row);
-                    place_m = stage.place_m(p_mm);
-                }
-            }
-        }
-        self.unresolved += left;
-        [taken, 0.0]
+        };
+        bins(&mut self.room, &before.room, &after.room);
+        bins(&mut self.met, &before.met, &after.met);
     }
 
     /// Shares of the incident light, or None before any light fell.
@@ -329,10 +152,13 @@ impl LightTally {
 
 #[cfg(test)]
 mod tests {
-    use glam::DMat3;
+    use glam::{DMat3, DVec3};
 
-    use super::super::Metal;
+    use super::super::lit::Lit;
+    use super::super::{Metal, Pose, Room};
     use super::*;
+    use crate::fidelity::pixels::Pixels;
+    use crate::grid::{Heights, Window};
     use crate::optics::{ComplexIndex, Reflectance};
     use crate::screen::Polyhedron;
 
@@ -449,13 +275,11 @@ mod tests {
         let inner = Window { column: -6, row: 4, columns: 328, rows: 68 };
         let mut together = LightTally::default();
         together.add(&steps, inner, 0.01, &pose, &room, None);
-        let relief = Relief::new(&steps, 0.01, 0.3);
-        let stage = Stage::new(&room, &pose, DVec3::new(1.0, 0.5, 0.0), 5.0);
-        let ground = Ground { heights: &steps, step_mm: 0.01 };
+        let lit = Lit::new(&steps, inner, 0.01, &pose, &room).expect("data");
         let mut alone = LightTally::default();
         for row in inner.row..inner.row_end() {
             for column in inner.column..inner.column_end() {
-                alone.sample(&ground, &relief, &stage, column, row);
+                lit.sample(&mut alone, column, row);
             }
         }
         assert_eq!((together.samples, together.shadowed), (alone.samples, alone.shadowed));
