@@ -16,6 +16,16 @@ pub struct Arguments {
     /// Folder for check.json and the maps of what stays unreachable
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Part of the area to look at, in squares of 1024 samples that are spread evenly; figures then have a standard error
+    #[arg(long, value_name = "FRACTION", default_value_t = 1.0, value_parser = share, conflicts_with = "out")]
+    share: f64,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if share > 0.0 && share <= 1.0 => Ok(share),
+        _ => Err("a share of the area is above 0 and at most 1, as 0.1".into()),
+    }
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
@@ -23,7 +33,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let folder = arguments.job.parent().unwrap_or(Path::new(""));
     let console = Console::new(common.quiet, common.verbose);
     let staging = arguments.out.as_deref().map(Staging::beside).transpose()?;
-    let checked = pipeline::check(&job, folder, staging.as_ref().map(Staging::path), &console)?;
+    let checked =
+        pipeline::check(&job, folder, staging.as_ref().map(Staging::path), arguments.share, &console)?;
     console.times();
     if let Some(staging) = staging {
         write_json(&staging.path().join("check.json"), &checked)?;
@@ -47,6 +58,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
             "unreachable: part of the area left more than {} mm too high; normals: 95 % are off by less, in degrees",
             checked.deviation_mm
         );
+        if let Some(fraction) = checked.looked_at_fraction {
+            println!(
+                "{:.1} % of the area was looked at: the deepest is the deepest there, and after +- stands a standard error",
+                100.0 * fraction
+            );
+        }
         for finding in &checked.findings {
             let word = if finding.severity == Severity::Error { "error" } else { "warning" };
             println!("{word}: {}", finding.message);
@@ -70,4 +87,14 @@ fn print(name: &str, reach: &Reach) {
         light,
         if reach.refused.is_some() { "  (cannot be used here)" } else { "" }
     );
+    if let Some(error) = reach.standard_error {
+        let light = error.on_audience_machined.map_or(String::new(), |error| format!("+- {error:.4}"));
+        println!(
+            "{:<29} {:>10.3} % {:>8.2} % {:>21} {light}",
+            "+-",
+            100.0 * error.unreachable_fraction,
+            100.0 * error.cavity_area_fraction,
+            ""
+        );
+    }
 }

@@ -8,15 +8,16 @@ use serde::Serialize;
 
 use super::cut::{distinct, setups};
 use super::judge::blocks;
-use super::light::{self, Sight};
+use super::light;
+use super::measure::{Looked, MOST_CUTTERS, Measured};
 use super::part::Part;
 use super::plan::TileSetup;
+use super::share::standard_error;
 use super::shop::Shop;
 use super::{Error, WITHIN, maps};
 use crate::compensation::{self, Tables};
-use crate::fidelity::light::{Known, LightTally};
-use crate::fidelity::{self, Layers, Tally};
-use crate::grid::{Heights, Window};
+use crate::fidelity::light::LightTally;
+use crate::grid::Heights;
 use crate::job::Job;
 use crate::machine::Tool;
 use crate::progress::Progress;
@@ -25,8 +26,8 @@ use crate::report::{Finding, Light, Severity, Verdict, finding};
 /// Sets of cutters whose light and normals are worked out before the job is called infeasible.
 const TRIED_SETS: usize = 4;
 
-/// Most cutters that are tried together.
-const MOST_CUTTERS: usize = 12;
+/// Standard errors from a limit within which a share of the area does not tell.
+const NEAR: f64 = 3.0;
 
 /// What one cutter, or a set, leaves of a part at best.
 #[derive(Clone, Debug, Serialize)]
@@ -42,8 +43,20 @@ pub struct Reach {
     pub normal_p95_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub light: Option<Light>,
+    /// Where a share of the area was looked at: standard errors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_error: Option<StandardError>,
     /// Why it cannot be used at all: stick-out, machine.
     pub refused: Option<String>,
+}
+
+/// How far figures that a share of the area gave are from those of all of it, in two cases of three.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct StandardError {
+    pub unreachable_fraction: f64,
+    pub cavity_area_fraction: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on_audience_machined: Option<f64>,
 }
 
 /// The answer of `check`.
@@ -54,6 +67,9 @@ pub struct Checked {
     pub verdict: Verdict,
     pub deviation_mm: f64,
     pub tiles: usize,
+    /// Part of the area that was looked at, where that is not all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub looked_at_fraction: Option<f64>,
     pub z_range_mm: f64,
     /// Each cutter by itself, as in the library.
     pub cutters: Vec<Reach>,
@@ -63,24 +79,19 @@ pub struct Checked {
 }
 
 /// One cutter under test.
-struct Candidate<'a> {
-    tool: &'a Tool,
-    tables: Tables,
-    refused: Option<String>,
+pub(super) struct Candidate<'a> {
+    pub tool: &'a Tool,
+    pub tables: Tables,
+    pub refused: Option<String>,
 }
 
-/// What was measured of one set.
-#[derive(Clone)]
-struct Measured {
-    tally: Tally,
-    light: LightTally,
-}
-
-/// Checks a job; with `out`, the cavities of the set (or of all cutters, if none will do) are written as maps there.
+/// Checks a job, by a `share` of the area up to 1 for all of it; with `out`, the cavities of the set (or of all
+/// cutters, if none will do) are written as maps there, all of them whatever the share.
 pub fn check(
     job: &Job,
     folder: &Path,
     out: Option<&Path>,
+    share: f64,
     progress: &dyn Progress,
 ) -> Result<Checked, Error> {
     let shop = Shop::open(job, folder)?;
@@ -89,9 +100,9 @@ pub fn check(
     let tiles = setups(job, &shop, &part)?;
     let candidates = candidates(job, &shop, &tiles)?;
     let usable: Vec<usize> = (0..candidates.len()).filter(|&i| candidates[i].refused.is_none()).collect();
-    let job_facts = Facts { job, part: &part, tiles: &tiles, candidates: &candidates };
+    let job_facts = Facts { job, part: &part, tiles: &tiles, candidates: &candidates, share };
     let singles: Vec<Vec<usize>> = (0..candidates.len()).map(|i| vec![i]).collect();
-    progress.begin("cutters one by one", job_facts.samples());
+    progress.begin("cutters one by one", job_facts.looked_at());
     let (measured, masks, designed) = job_facts.measure(&singles, progress)?;
     let mut cutters = Vec::new();
     for (index, measured) in measured.iter().enumerate() {
@@ -103,7 +114,7 @@ pub fn check(
         let reach = match set[..] {
             [index] => job_facts.reach(&set, &measured[index], &designed),
             _ => {
-                progress.begin("sets of cutters", job_facts.samples());
+                progress.begin("sets of cutters", job_facts.looked_at());
                 let (together, ..) = job_facts.measure(std::slice::from_ref(&set), progress)?;
                 job_facts.reach(&set, &together[0], &designed)
             }
@@ -123,6 +134,18 @@ pub fn check(
             findings.push(finding(Severity::Warning, "cutter", why.clone()));
         }
     }
+    if let Some(set) = &smallest_set
+        && let Some(error) = set.standard_error
+        && set.unreachable_fraction + NEAR * error.unreachable_fraction > 1.0 - WITHIN
+    {
+        let [percent, off] = [set.unreachable_fraction, error.unreachable_fraction].map(|part| 100.0 * part);
+        let message = format!(
+            "{} leave {percent:.2} +- {off:.2} % of the area out of the limit, 1 % is allowed: too near to tell by a share \
+             of the area; hint: check without --share",
+            set.tools.join(" and ")
+        );
+        findings.push(finding(Severity::Warning, "share", message));
+    }
     if smallest_set.is_none() {
         findings.push(finding(Severity::Error, "unreachable", job_facts.why_not(&cutters)));
     }
@@ -136,6 +159,7 @@ pub fn check(
         verdict: if smallest_set.is_some() { Verdict::Pass } else { Verdict::Fail },
         deviation_mm: job.limits.deviation_or_default_mm(),
         tiles: tiles.len(),
+        looked_at_fraction: (share < 1.0).then(|| job_facts.looked_at() as f64 / job_facts.samples() as f64),
         z_range_mm: part.whole.top_mm() - part.whole.bottom_mm(),
         cutters,
         smallest_set,
@@ -198,130 +222,18 @@ fn sets(usable: &[usize], masks: &[u64]) -> Vec<Vec<usize>> {
 }
 
 /// The part and the cutters that are tried on it.
-struct Facts<'a> {
-    job: &'a Job,
-    part: &'a Part,
-    tiles: &'a [TileSetup],
-    candidates: &'a [Candidate<'a>],
+pub(super) struct Facts<'a> {
+    pub job: &'a Job,
+    pub part: &'a Part,
+    pub tiles: &'a [TileSetup],
+    pub candidates: &'a [Candidate<'a>],
+    /// Part of the area that is looked at.
+    pub share: f64,
 }
 
 impl Facts<'_> {
     fn samples(&self) -> u64 {
         self.tiles.iter().map(|tile| tile.surface().lattice()).map(|l| (l.columns * l.rows) as u64).sum()
-    }
-
-    fn params(&self) -> fidelity::Params {
-        let limit_mm = Some(self.job.limits.deviation_or_default_mm());
-        fidelity::Params { step_mm: self.job.part.step_mm, limit_mm }
-    }
-
-    /// Tallies of each set over all tiles, how many samples each combination of single cutters reaches, and the
-    /// light of the design.
-    fn measure(
-        &self,
-        sets: &[Vec<usize>],
-        progress: &dyn Progress,
-    ) -> Result<(Vec<Measured>, Vec<u64>, LightTally), Error> {
-        let fresh = || Measured { tally: Tally::new(self.params()), light: LightTally::default() };
-        let mut totals: Vec<Measured> = sets.iter().map(|_| fresh()).collect();
-        let mut masks = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
-        let mut designed = LightTally::default();
-        for tile in self.tiles {
-            let sight = self.sight(tile);
-            for row in blocks(&tile.surface().lattice()) {
-                let measured: Vec<_> = row
-                    .par_iter()
-                    .map(|&window| {
-                        if progress.interrupted() {
-                            return Err(Error::Interrupted);
-                        }
-                        let done = self.block(tile, sight.as_ref(), window, sets);
-                        progress.advance(window.samples() as u64);
-                        done
-                    })
-                    .collect::<Result<_, Error>>()?;
-                for (sets, counts, light) in measured {
-                    for (total, set) in totals.iter_mut().zip(&sets) {
-                        total.tally.merge(&set.tally);
-                        total.light.merge(&set.light);
-                    }
-                    for (sum, count) in masks.iter_mut().zip(counts) {
-                        *sum += count;
-                    }
-                    designed.merge(&light);
-                }
-            }
-        }
-        Ok((totals, masks, designed))
-    }
-
-    fn sight(&self, tile: &TileSetup) -> Option<Sight<'_>> {
-        let steepest = self.part.whole.steepest();
-        let pose = self.part.pose(self.job, &tile.piece)?;
-        let scene = self.part.scene.as_ref()?;
-        Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]), far_field: None })
-    }
-
-    fn block(
-        &self,
-        tile: &TileSetup,
-        sight: Option<&Sight>,
-        window: Window,
-        sets: &[Vec<usize>],
-    ) -> Result<(Vec<Measured>, Vec<u64>, LightTally), Error> {
-        let surface = tile.surface();
-        let step_mm = self.job.part.step_mm;
-        let limit_mm = self.job.limits.deviation_or_default_mm() as f32;
-        let reach =
-            sets.iter().flatten().map(|&i| self.candidates[i].tables.profile().reach()).max().unwrap_or(0);
-        // Normals need one sample around the block, rays as many as `light` gives them.
-        let halo = if sight.is_some() { light::halo(step_mm) } else { 1 };
-        let near = window.grown(halo);
-        let around = surface.heights(near.grown(2 * reach), surface.top_mm())?;
-        let design = around.crop(near);
-        let room = sight.map(|sight| (sight.pose, sight.room()));
-        let known = room.as_ref().map(|(pose, room)| Known::new(&design, window, step_mm, pose, room));
-        let mut reached = vec![0u16; near.samples()];
-        let mut measured = Vec::new();
-        for (bit, set) in sets.iter().enumerate() {
-            let mut closing = self.closing(&around, set, near);
-            for ((mask, closed), z) in reached.iter_mut().zip(&mut closing.z_mm).zip(&design.z_mm) {
-                *mask |= u16::from(*closed - z <= limit_mm) << bit;
-                if z.is_nan() {
-                    // Past the part's edge there is nothing, only the cutter's flank.
-                    *closed = f32::NAN;
-                }
-            }
-            let mut tally = Tally::new(self.params());
-            let cavity = compensation::residual(&closing, &design);
-            let layers = Layers { design: &design, machined: &closing, cavity: Some(&cavity), passes: None };
-            tally.add(window, layers)?;
-            let light = known.as_ref().map_or_else(LightTally::default, |known| known.with(&closing));
-            measured.push(Measured { tally, light });
-        }
-        let mut counts = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
-        for row in window.row..window.row_end() {
-            let start = (row - near.row) as usize * near.columns + halo;
-            let line = &reached[start..start + window.columns];
-            for (mask, z) in line.iter().zip(&design.z_mm[start..]) {
-                if !z.is_nan() {
-                    counts[usize::from(*mask)] += 1;
-                }
-            }
-        }
-        let designed = known.map_or_else(LightTally::default, Known::into_light);
-        Ok((measured, counts, designed))
-    }
-
-    fn closing(&self, around: &Heights, set: &[usize], out: Window) -> Heights {
-        let mut lowest = Heights::empty(out);
-        for &index in set {
-            let closing = compensation::closing_by(around, &self.candidates[index].tables, out);
-            for (z, other) in lowest.z_mm.iter_mut().zip(&closing.z_mm) {
-                *z = z.min(*other);
-            }
-        }
-        lowest
     }
 
     fn reach(&self, set: &[usize], measured: &Measured, designed: &LightTally) -> Reach {
@@ -335,8 +247,24 @@ impl Facts<'_> {
             cavity_max_depth_mm: figures.cavity_max_depth_mm.unwrap_or(0.0),
             normal_p95_deg: figures.normal_p95_deg,
             light: self.light(designed, &measured.light),
+            standard_error: self.standard_error(measured),
             refused: set.iter().find_map(|&index| self.candidates[index].refused.clone()),
         }
+    }
+
+    fn standard_error(&self, measured: &Measured) -> Option<StandardError> {
+        if self.share >= 1.0 {
+            return None;
+        }
+        let error = |of: fn(&Looked) -> (f64, f64)| {
+            let squares: Vec<(f64, f64)> = measured.squares.iter().map(of).collect();
+            standard_error(&squares, self.share)
+        };
+        Some(StandardError {
+            unreachable_fraction: error(|square| (square.unreachable, square.samples))?,
+            cavity_area_fraction: error(|square| (square.cavity, square.samples))?,
+            on_audience_machined: error(|square| (square.on_audience, square.incident)),
+        })
     }
 
     fn light(&self, designed: &LightTally, machined: &LightTally) -> Option<Light> {

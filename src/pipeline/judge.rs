@@ -108,51 +108,95 @@ struct Block {
 pub fn judge(
     case: &Case,
     progress: &dyn Progress,
-    each: &mut dyn FnMut(Strip) -> Result<(), Error>,
+    each: &mut (dyn FnMut(Strip) -> Result<(), Error> + Send),
 ) -> Result<Verdict, Error> {
     let lattice = case.surface.lattice();
-    let mut tallies: Vec<Tally> = case.posts.iter().map(|_| Tally::new(case.tally)).collect();
-    let mut cuts: Vec<Vec<ProgramCut>> =
-        case.posts.iter().map(|programs| vec![ProgramCut::default(); programs.len()]).collect();
-    let mut light_designed = LightTally::default();
-    let mut light_machined: Vec<LightTally> = case.posts.iter().map(|_| LightTally::default()).collect();
-    let mut light_polished = LightTally::default();
-    let picture = || Pixels::new(lattice.columns, lattice.rows, case.most_pixels);
-    let mut pictures = Pictures { normals: picture(), light: case.sight.map(|_| [picture(), picture()]) };
-    let mut cavities = Cavities::new(case.cavities, lattice.window());
-    for row in blocks(&lattice) {
-        let blocks: Vec<Block> = row
-            .par_iter()
+    let mut sums = Sums::new(case, &lattice);
+    let empty = sums.pictures.clone();
+    let make = |row: &[Window]| -> Result<Vec<Block>, Error> {
+        row.par_iter()
             .map(|&window| {
                 if progress.interrupted() {
                     return Err(Error::Interrupted);
                 }
-                let block = case.block(window, &pictures);
+                let block = case.block(window, &empty);
                 progress.advance(window.samples() as u64);
                 block
             })
-            .collect::<Result<_, Error>>()?;
+            .collect()
+    };
+    let rows = blocks(&lattice);
+    let mut ready = rows.first().map_or(Ok(Vec::new()), |row| make(row))?;
+    for next in (1..).map(|k| rows.get(k)).take(rows.len()) {
+        let made = std::mem::take(&mut ready);
+        // What has to be done in order takes one thread; the others go on with the next row of blocks.
+        let (taken, next) = rayon::join(
+            || sums.take(made, lattice.columns, each),
+            || next.map_or(Ok(Vec::new()), |row| make(row)),
+        );
+        taken?;
+        ready = next?;
+    }
+    Ok(sums.verdict())
+}
+
+/// What is summed up, in the order of the blocks.
+struct Sums {
+    tallies: Vec<Tally>,
+    cuts: Vec<Vec<ProgramCut>>,
+    light_designed: LightTally,
+    light_machined: Vec<LightTally>,
+    light_polished: LightTally,
+    pictures: Pictures,
+    cavities: Cavities,
+}
+
+impl Sums {
+    fn new(case: &Case, lattice: &Lattice) -> Sums {
+        let picture = || Pixels::new(lattice.columns, lattice.rows, case.most_pixels);
+        let nothing = |programs: &Vec<Judged>| vec![ProgramCut::default(); programs.len()];
+        Sums {
+            tallies: case.posts.iter().map(|_| Tally::new(case.tally)).collect(),
+            cuts: case.posts.iter().map(nothing).collect(),
+            light_designed: LightTally::default(),
+            light_machined: case.posts.iter().map(|_| LightTally::default()).collect(),
+            light_polished: LightTally::default(),
+            pictures: Pictures { normals: picture(), light: case.sight.map(|_| [picture(), picture()]) },
+            cavities: Cavities::new(case.cavities, lattice.window()),
+        }
+    }
+
+    /// Takes a row of blocks, and hands on its rows of samples.
+    fn take(
+        &mut self,
+        blocks: Vec<Block>,
+        columns: usize,
+        each: &mut (dyn FnMut(Strip) -> Result<(), Error> + Send),
+    ) -> Result<(), Error> {
         let mut layers = Vec::new();
         for block in blocks {
-            for (sum, tally) in tallies.iter_mut().zip(&block.tallies) {
+            for (sum, tally) in self.tallies.iter_mut().zip(&block.tallies) {
                 sum.merge(tally);
             }
-            for (sum, cut) in cuts.iter_mut().flatten().zip(block.cuts.iter().flatten()) {
+            for (sum, cut) in self.cuts.iter_mut().flatten().zip(block.cuts.iter().flatten()) {
                 sum.merge(cut);
             }
-            light_designed.merge(&block.light_designed);
-            for (sum, light) in light_machined.iter_mut().zip(&block.light_machined) {
+            self.light_designed.merge(&block.light_designed);
+            for (sum, light) in self.light_machined.iter_mut().zip(&block.light_machined) {
                 sum.merge(light);
             }
-            light_polished.merge(&block.light_polished);
-            pictures.merge(&block.pictures);
-            cavities.add(block.labelled)?;
+            self.light_polished.merge(&block.light_polished);
+            self.pictures.merge(&block.pictures);
+            self.cavities.add(block.labelled)?;
             layers.push([block.design, block.machined, block.cavity]);
         }
+        let Some(Window { row, rows, .. }) = layers.first().map(|layers| layers[0].window) else {
+            return Ok(());
+        };
         // A few rows at a time: a copy of all would be as much as the blocks themselves.
-        for first in (0..row[0].rows).step_by(STRIP_ROWS) {
-            let rows = STRIP_ROWS.min(row[0].rows - first);
-            let window = Window { column: 0, row: row[0].row + first as i64, columns: lattice.columns, rows };
+        for first in (0..rows).step_by(STRIP_ROWS) {
+            let rows = STRIP_ROWS.min(rows - first);
+            let window = Window { column: 0, row: row + first as i64, columns, rows };
             let [design, machined, cavity] = std::array::from_fn(|layer| {
                 let mut strip = Heights::empty(window);
                 layers.iter().for_each(|layers| paste(&mut strip, &layers[layer]));
@@ -160,16 +204,20 @@ pub fn judge(
             });
             each(Strip { design, machined, cavity })?;
         }
+        Ok(())
     }
-    Ok(Verdict {
-        tallies,
-        cuts,
-        cavities: cavities.finish(),
-        light_designed,
-        light_machined,
-        light_polished,
-        pictures: Some(pictures),
-    })
+
+    fn verdict(self) -> Verdict {
+        Verdict {
+            tallies: self.tallies,
+            cuts: self.cuts,
+            cavities: self.cavities.finish(),
+            light_designed: self.light_designed,
+            light_machined: self.light_machined,
+            light_polished: self.light_polished,
+            pictures: Some(self.pictures),
+        }
+    }
 }
 
 /// The blocks of a tile, row by row, lowest y first.

@@ -92,6 +92,11 @@ impl LightTally {
         bins(&mut self.met, &before.met, &after.met);
     }
 
+    /// The light that fell, and what of it reached the audience, as cosines summed over samples.
+    pub fn incident_and_on_audience(&self) -> [f64; 2] {
+        [self.incident, self.on_audience]
+    }
+
     /// Shares of the incident light, or None before any light fell.
     pub fn shares(&self) -> Option<Shares> {
         (self.incident > 0.0).then(|| Shares {

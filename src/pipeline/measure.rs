@@ -1,0 +1,190 @@
+//! What cutters leave of a part at best: deviations, normals and light of their closings, block by block.
+
+use rayon::prelude::*;
+
+use super::Error;
+use super::check::Facts;
+use super::judge::blocks;
+use super::light::{self, Sight};
+use super::plan::TileSetup;
+use super::share::squares;
+use crate::compensation;
+use crate::fidelity::light::{Known, LightTally};
+use crate::fidelity::{self, Layers, Tally};
+use crate::grid::{Heights, Window};
+use crate::progress::Progress;
+
+/// Most cutters that are tried together.
+pub(super) const MOST_CUTTERS: usize = 12;
+
+/// Squares that are looked at before their sums are taken, where not all is looked at.
+const TOGETHER: usize = 16;
+
+/// What was measured of one set.
+#[derive(Clone)]
+pub(super) struct Measured {
+    pub tally: Tally,
+    pub light: LightTally,
+    /// Sums of each block by itself.
+    pub squares: Vec<Looked>,
+}
+
+/// Sums over one block, for standard errors.
+#[derive(Clone, Copy)]
+pub(super) struct Looked {
+    pub samples: f64,
+    pub unreachable: f64,
+    pub cavity: f64,
+    pub incident: f64,
+    pub on_audience: f64,
+}
+
+impl Measured {
+    fn new(params: fidelity::Params) -> Measured {
+        Measured { tally: Tally::new(params), light: LightTally::default(), squares: Vec::new() }
+    }
+
+    fn add(&mut self, block: &Measured) {
+        self.tally.merge(&block.tally);
+        self.light.merge(&block.light);
+        let figures = block.tally.figures();
+        let samples = figures.samples as f64;
+        let [incident, on_audience] = block.light.incident_and_on_audience();
+        self.squares.push(Looked {
+            samples,
+            unreachable: samples * (1.0 - figures.within_limit_fraction.unwrap_or(1.0)),
+            cavity: samples * figures.cavity_area_fraction.unwrap_or(0.0),
+            incident,
+            on_audience,
+        });
+    }
+}
+
+impl Facts<'_> {
+    /// Samples that are looked at.
+    pub(super) fn looked_at(&self) -> u64 {
+        let windows = |tile| self.windows(tile).into_iter().flatten();
+        self.tiles.iter().flat_map(windows).map(|window: Window| window.samples() as u64).sum()
+    }
+
+    /// The windows of a tile that are looked at, in groups.
+    fn windows(&self, tile: &TileSetup) -> Vec<Vec<Window>> {
+        let lattice = tile.surface().lattice();
+        if self.share >= 1.0 {
+            return blocks(&lattice);
+        }
+        squares(&lattice, self.share).chunks(TOGETHER).map(<[Window]>::to_vec).collect()
+    }
+
+    fn params(&self) -> fidelity::Params {
+        let limit_mm = Some(self.job.limits.deviation_or_default_mm());
+        fidelity::Params { step_mm: self.job.part.step_mm, limit_mm }
+    }
+
+    /// Tallies of each set over all tiles, how many samples each combination of single cutters reaches, and the
+    /// light of the design.
+    pub(super) fn measure(
+        &self,
+        sets: &[Vec<usize>],
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Measured>, Vec<u64>, LightTally), Error> {
+        let mut totals: Vec<Measured> = sets.iter().map(|_| Measured::new(self.params())).collect();
+        let mut masks = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
+        let mut designed = LightTally::default();
+        for tile in self.tiles {
+            let sight = self.sight(tile);
+            for row in self.windows(tile) {
+                let measured: Vec<_> = row
+                    .par_iter()
+                    .map(|&window| {
+                        if progress.interrupted() {
+                            return Err(Error::Interrupted);
+                        }
+                        let done = self.block(tile, sight.as_ref(), window, sets);
+                        progress.advance(window.samples() as u64);
+                        done
+                    })
+                    .collect::<Result<_, Error>>()?;
+                for (sets, counts, light) in measured {
+                    for (total, set) in totals.iter_mut().zip(&sets) {
+                        total.add(set);
+                    }
+                    for (sum, count) in masks.iter_mut().zip(counts) {
+                        *sum += count;
+                    }
+                    designed.merge(&light);
+                }
+            }
+        }
+        Ok((totals, masks, designed))
+    }
+
+    fn sight(&self, tile: &TileSetup) -> Option<Sight<'_>> {
+        let steepest = self.part.whole.steepest();
+        let pose = self.part.pose(self.job, &tile.piece)?;
+        let scene = self.part.scene.as_ref()?;
+        Some(Sight { scene, pose, steepest: steepest[0].hypot(steepest[1]), far_field: None })
+    }
+
+    fn block(
+        &self,
+        tile: &TileSetup,
+        sight: Option<&Sight>,
+        window: Window,
+        sets: &[Vec<usize>],
+    ) -> Result<(Vec<Measured>, Vec<u64>, LightTally), Error> {
+        let surface = tile.surface();
+        let step_mm = self.job.part.step_mm;
+        let limit_mm = self.job.limits.deviation_or_default_mm() as f32;
+        let reach =
+            sets.iter().flatten().map(|&i| self.candidates[i].tables.profile().reach()).max().unwrap_or(0);
+        // Normals need one sample around the block, rays as many as `light` gives them.
+        let halo = if sight.is_some() { light::halo(step_mm) } else { 1 };
+        let near = window.grown(halo);
+        let around = surface.heights(near.grown(2 * reach), surface.top_mm())?;
+        let design = around.crop(near);
+        let room = sight.map(|sight| (sight.pose, sight.room()));
+        let known = room.as_ref().map(|(pose, room)| Known::new(&design, window, step_mm, pose, room));
+        let mut reached = vec![0u16; near.samples()];
+        let mut measured = Vec::new();
+        for (bit, set) in sets.iter().enumerate() {
+            let mut closing = self.closing(&around, set, near);
+            for ((mask, closed), z) in reached.iter_mut().zip(&mut closing.z_mm).zip(&design.z_mm) {
+                *mask |= u16::from(*closed - z <= limit_mm) << bit;
+                if z.is_nan() {
+                    // Past the part's edge there is nothing, only the cutter's flank.
+                    *closed = f32::NAN;
+                }
+            }
+            let mut tally = Tally::new(self.params());
+            let cavity = compensation::residual(&closing, &design);
+            let layers = Layers { design: &design, machined: &closing, cavity: Some(&cavity), passes: None };
+            tally.add(window, layers)?;
+            let light = known.as_ref().map_or_else(LightTally::default, |known| known.with(&closing));
+            measured.push(Measured { tally, light, squares: Vec::new() });
+        }
+        let mut counts = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
+        for row in window.row..window.row_end() {
+            let start = (row - near.row) as usize * near.columns + halo;
+            let line = &reached[start..start + window.columns];
+            for (mask, z) in line.iter().zip(&design.z_mm[start..]) {
+                if !z.is_nan() {
+                    counts[usize::from(*mask)] += 1;
+                }
+            }
+        }
+        let designed = known.map_or_else(LightTally::default, Known::into_light);
+        Ok((measured, counts, designed))
+    }
+
+    pub(super) fn closing(&self, around: &Heights, set: &[usize], out: Window) -> Heights {
+        let mut lowest = Heights::empty(out);
+        for &index in set {
+            let closing = compensation::closing_by(around, &self.candidates[index].tables, out);
+            for (z, other) in lowest.z_mm.iter_mut().zip(&closing.z_mm) {
+                *z = z.min(*other);
+            }
+        }
+        lowest
+    }
+}

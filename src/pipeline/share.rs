@@ -1,0 +1,118 @@
+//! A share of a tile's area, spread evenly, and how far what is measured on it may be from the whole.
+
+use crate::grid::{Lattice, Window};
+
+/// Samples along a side of a square that is looked at: two or three cells of a screen, more than most cutters reach.
+const SQUARE: usize = 1024;
+
+/// The squares of a tile that stand for all of it: of every 1 / `share` in a row one, drawn by its place. All of
+/// them where `share` is 1.
+pub fn squares(lattice: &Lattice, share: f64) -> Vec<Window> {
+    let starts = |count: usize| (0..count).step_by(SQUARE);
+    let mut all: Vec<Window> = Vec::new();
+    for (nth, row) in starts(lattice.rows).enumerate() {
+        let rows = SQUARE.min(lattice.rows - row);
+        let along = starts(lattice.columns).map(|column| {
+            let columns = SQUARE.min(lattice.columns - column);
+            Window { column: column as i64, row: row as i64, columns, rows }
+        });
+        // To and fro, so that neighbours in the list are neighbours on the tile.
+        let mut along: Vec<Window> = along.collect();
+        if nth % 2 == 1 {
+            along.reverse();
+        }
+        all.append(&mut along);
+    }
+    let strata = ((all.len() as f64 * share).round() as usize).clamp(1, all.len().max(1));
+    let first = |stratum: usize| stratum * all.len() / strata;
+    (0..strata)
+        .filter_map(|stratum| {
+            let (start, end) = (first(stratum), first(stratum + 1));
+            let drawn = start + (scattered(stratum as u64) % (end - start).max(1) as u64) as usize;
+            all.get(drawn).copied()
+        })
+        .collect()
+}
+
+/// A number that has nothing to do with its neighbours' (SplitMix64, Steele et al. 2014, doi 10.1145/2714064.2660195).
+fn scattered(n: u64) -> u64 {
+    let mut z = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Standard error of the ratio of two sums over squares, `(part, of)` each in the order of [`squares`], that were
+/// drawn one from each of some strata: by the differences of neighbours (Wolter, Introduction to Variance
+/// Estimation, 2007, chapter 8). None for fewer than two.
+pub fn standard_error(squares: &[(f64, f64)], share: f64) -> Option<f64> {
+    let count = squares.len() as f64;
+    let (part, of) = squares.iter().fold((0.0, 0.0), |sum, square| (sum.0 + square.0, sum.1 + square.1));
+    if squares.len() < 2 || of <= 0.0 {
+        return None;
+    }
+    let ratio = part / of;
+    let rest = |square: &(f64, f64)| square.0 - ratio * square.1;
+    let differences: f64 = squares.windows(2).map(|pair| (rest(&pair[0]) - rest(&pair[1])).powi(2)).sum();
+    let variance = differences / (2.0 * (count - 1.0));
+    Some(((1.0 - share).max(0.0) * count * variance).sqrt() / of)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lattice(columns: usize, rows: usize) -> Lattice {
+        let step_mm = 0.01;
+        Lattice {
+            columns,
+            rows,
+            step_mm,
+            width_mm: columns as f64 * step_mm,
+            height_mm: rows as f64 * step_mm,
+        }
+    }
+
+    #[test]
+    fn all_of_a_tile_is_every_square_once() {
+        let lattice = lattice(5000, 2100);
+        let all = squares(&lattice, 1.0);
+        assert_eq!(all.len(), 15);
+        assert_eq!(all.iter().map(Window::samples).sum::<usize>(), 5000 * 2100);
+    }
+
+    #[test]
+    fn a_share_is_spread_over_the_tile() {
+        let lattice = lattice(20_000, 20_000);
+        let some = squares(&lattice, 0.1);
+        assert_eq!(some.len(), 40);
+        for quarter in 0..4 {
+            let inside = |w: &&Window| w.column / 10_000 + 2 * (w.row / 10_000) == quarter;
+            let count = some.iter().filter(inside).count();
+            assert!((7..=13).contains(&count), "{count} in quarter {quarter}");
+        }
+        assert_eq!(squares(&lattice, 1e-9).len(), 1);
+    }
+
+    /// Of a figure that drifts over the tile and has noise, nine of ten estimates lie within two standard errors.
+    #[test]
+    fn the_error_is_about_what_it_says() {
+        let noise = |n: u64| scattered(n) as f64 / u64::MAX as f64 - 0.5;
+        let of = |n: usize, set: u64| 0.3 + n as f64 * 5e-4 + 0.2 * noise(n as u64 + 1000 * set);
+        let (mut within, sets) = (0, 200);
+        for set in 0..sets {
+            let all: Vec<f64> = (0..400).map(|n| of(n, set)).collect();
+            let truth = all.iter().sum::<f64>() / 400.0;
+            let drawn: Vec<(f64, f64)> = (0..40)
+                .map(|stratum| {
+                    let nth = scattered(stratum + 77 * set) % 10;
+                    (all[(stratum * 10 + nth) as usize], 1.0)
+                })
+                .collect();
+            let mean = drawn.iter().map(|square| square.0).sum::<f64>() / 40.0;
+            let error = standard_error(&drawn, 0.1).expect("40 squares");
+            within += u64::from((mean - truth).abs() < 2.0 * error);
+        }
+        assert!(within * 10 > 9 * sets && within < sets, "{within} of {sets}");
+    }
+}
