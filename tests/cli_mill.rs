@@ -272,6 +272,15 @@ fn check_says_of_a_cutter_what_light_says_of_its_closing() {
     let bench = Bench::with(&[]);
     let said = bench.run("check job.toml --json --quiet");
     let checked: Value = serde_json::from_slice(&said.get_output().stdout).expect("JSON");
+    // A piece of one square is looked at as a whole, whatever the share.
+    let shared = bench.run("check job.toml --share 0.3 --json --quiet");
+    let shared: Value = serde_json::from_slice(&shared.get_output().stdout).expect("JSON");
+    assert_eq!(shared["looked_at_fraction"], 1.0);
+    assert_eq!(shared["smallest_set"]["tools"], checked["smallest_set"]["tools"]);
+    for share in ["0", "1.5", "nan", "half"] {
+        bench.run(&format!("check job.toml --share {share}")).code(2).stderr(contains("share of the area"));
+    }
+    bench.run("check job.toml --share 0.5 --out checked").code(2);
     bench.run("design screen.toml --out d.npz --cells 324 149 325 150 --quiet").success();
     let cutters = checked["cutters"].as_array().expect("cutters");
     let mut before = 1.0;

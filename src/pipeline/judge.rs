@@ -222,13 +222,18 @@ impl Sums {
 
 /// The blocks of a tile, row by row, lowest y first.
 pub fn blocks(lattice: &Lattice) -> Vec<Vec<Window>> {
+    blocks_of(lattice, [BLOCK_COLUMNS, BLOCK_ROWS])
+}
+
+/// Blocks of so many columns and rows, row by row, lowest y first.
+pub fn blocks_of(lattice: &Lattice, [columns, rows]: [usize; 2]) -> Vec<Vec<Window>> {
     let starts = |count: usize, step: usize| (0..count).step_by(step);
-    starts(lattice.rows, BLOCK_ROWS)
+    starts(lattice.rows, rows)
         .map(|row| {
-            let rows = BLOCK_ROWS.min(lattice.rows - row);
-            starts(lattice.columns, BLOCK_COLUMNS)
+            let rows = rows.min(lattice.rows - row);
+            starts(lattice.columns, columns)
                 .map(|column| {
-                    let columns = BLOCK_COLUMNS.min(lattice.columns - column);
+                    let columns = columns.min(lattice.columns - column);
                     Window { column: column as i64, row: row as i64, columns, rows }
                 })
                 .collect()

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Error;
 use super::check::Facts;
-use super::judge::blocks;
+use super::judge::blocks_of;
 use super::light::{self, Sight};
 use super::plan::TileSetup;
 use super::share::squares;
@@ -17,8 +17,11 @@ use crate::progress::Progress;
 /// Most cutters that are tried together.
 pub(super) const MOST_CUTTERS: usize = 12;
 
-/// Squares that are looked at before their sums are taken, where not all is looked at.
-const TOGETHER: usize = 16;
+/// Samples along a side of a block: a closing needs twice the cutter's reach around it, which large blocks share.
+const BLOCK: usize = 2048;
+
+/// Blocks that are looked at before their sums are taken: enough that threads seldom wait for the last of them.
+const TOGETHER: usize = 8;
 
 /// What was measured of one set.
 #[derive(Clone)]
@@ -70,10 +73,11 @@ impl Facts<'_> {
     /// The windows of a tile that are looked at, in groups.
     fn windows(&self, tile: &TileSetup) -> Vec<Vec<Window>> {
         let lattice = tile.surface().lattice();
-        if self.share >= 1.0 {
-            return blocks(&lattice);
-        }
-        squares(&lattice, self.share).chunks(TOGETHER).map(<[Window]>::to_vec).collect()
+        let windows = match self.share {
+            share if share < 1.0 => squares(&lattice, share),
+            _ => blocks_of(&lattice, [BLOCK; 2]).concat(),
+        };
+        windows.chunks(TOGETHER).map(<[Window]>::to_vec).collect()
     }
 
     fn params(&self) -> fidelity::Params {
