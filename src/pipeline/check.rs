@@ -16,7 +16,7 @@ use super::share::standard_error;
 use super::shop::Shop;
 use super::{Error, WITHIN, maps};
 use crate::compensation::{self, Tables};
-use crate::fidelity::light::LightTally;
+use crate::fidelity::light::{LightTally, View};
 use crate::grid::Heights;
 use crate::job::Job;
 use crate::machine::Tool;
@@ -85,6 +85,12 @@ pub(super) struct Candidate<'a> {
     pub refused: Option<String>,
 }
 
+/// The design's light, and the audience as it is seen from the part.
+struct Designed {
+    light: LightTally,
+    view: Option<View>,
+}
+
 /// Checks a job, by a `share` of the area up to 1 for all of it; with `out`, the cavities of the set (or of all
 /// cutters, if none will do) are written as maps there, all of them whatever the share.
 pub fn check(
@@ -104,6 +110,7 @@ pub fn check(
     let singles: Vec<Vec<usize>> = (0..candidates.len()).map(|i| vec![i]).collect();
     progress.begin("cutters one by one", job_facts.looked_at());
     let (measured, masks, designed) = job_facts.measure(&singles, progress)?;
+    let designed = Designed { light: designed, view: job_facts.view() };
     let mut cutters = Vec::new();
     for (index, measured) in measured.iter().enumerate() {
         cutters.push(job_facts.reach(&[index], measured, &designed));
@@ -236,7 +243,7 @@ impl Facts<'_> {
         self.tiles.iter().map(|tile| tile.surface().lattice()).map(|l| (l.columns * l.rows) as u64).sum()
     }
 
-    fn reach(&self, set: &[usize], measured: &Measured, designed: &LightTally) -> Reach {
+    fn reach(&self, set: &[usize], measured: &Measured, designed: &Designed) -> Reach {
         let figures = measured.tally.figures();
         let tools: Vec<&Tool> = set.iter().map(|&index| self.candidates[index].tool).collect();
         Reach {
@@ -246,7 +253,10 @@ impl Facts<'_> {
             cavity_area_fraction: figures.cavity_area_fraction.unwrap_or(0.0),
             cavity_max_depth_mm: figures.cavity_max_depth_mm.unwrap_or(0.0),
             normal_p95_deg: figures.normal_p95_deg,
-            light: self.light(designed, &measured.light),
+            light: designed
+                .view
+                .as_ref()
+                .and_then(|view| light::summary(&designed.light, &measured.light, view)),
             standard_error: self.standard_error(measured),
             refused: set.iter().find_map(|&index| self.candidates[index].refused.clone()),
         }
@@ -267,14 +277,15 @@ impl Facts<'_> {
         })
     }
 
-    fn light(&self, designed: &LightTally, machined: &LightTally) -> Option<Light> {
+    /// The audience as the part sees it.
+    fn view(&self) -> Option<View> {
         let scene = self.part.scene.as_ref()?;
         let mut points = Vec::new();
         for tile in self.tiles {
             let pose = self.part.pose(self.job, &tile.piece)?;
             points.extend(light::points(&pose, &tile.surface().lattice()));
         }
-        light::summary(designed, machined, &light::view(scene, &points))
+        Some(light::view(scene, &points))
     }
 
     /// Which limit breaks first, by how much.

@@ -47,9 +47,7 @@ impl<'a> Lit<'a> {
     ) -> Option<Lit<'a>> {
         let relief = Relief::new(heights, step_mm, room.steepest);
         let (columns, rows) = (window.columns as f64 * step_mm, window.rows as f64 * step_mm);
-        let finite = heights.z_mm.iter().copied().filter(|z| z.is_finite());
-        let (low, high) =
-            finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+        let [low, high] = relief.ends_mm();
         if low > high {
             return None;
         }

@@ -24,6 +24,8 @@ pub struct Relief<'a> {
     steepest: f64,
     across: usize,
     patches: Vec<Patch>,
+    /// Lowest and highest of all.
+    ends_mm: [f32; 2],
 }
 
 #[derive(Clone, Copy)]
@@ -54,29 +56,15 @@ impl<'a> Relief<'a> {
         let (across, down) = (columns.div_ceil(PATCH), rows.div_ceil(PATCH));
         let mut low = vec![f32::INFINITY; across * down];
         let mut high = vec![f32::NEG_INFINITY; across * down];
-        let mut climbs = vec![[0.0f32; 2]; across * down];
-        for row in 0..rows {
-            let line = &heights.z_mm[row * columns..(row + 1) * columns];
-            let above = heights.z_mm.get((row + 1) * columns..(row + 2) * columns).unwrap_or(line);
-            for patch in 0..across {
-                let at = row / PATCH * across + patch;
-                let (start, end) = (patch * PATCH, ((patch + 1) * PATCH).min(columns));
-                let (mut least, mut most, mut dx, mut dy) = (low[at], high[at], 0.0f32, 0.0f32);
-                // min and max leave NaN out.
-                for column in start..end {
-                    let z = line[column];
-                    least = least.min(z);
-                    most = most.max(z);
-                    dy = dy.max((above[column] - z).abs());
-                }
-                for pair in line[start..(end + 1).min(columns)].windows(2) {
-                    dx = dx.max((pair[1] - pair[0]).abs());
-                }
-                (low[at], high[at]) = (least, most);
-                climbs[at] = [climbs[at][0].max(dx), climbs[at][1].max(dy)];
-            }
+        let mut climbs = vec![0.0f32; across * down];
+        for at in 0..across * down {
+            let looked = Looked::over(heights, at % across * PATCH, at / across * PATCH);
+            (low[at], high[at], climbs[at]) = looked.ends();
         }
-        let climbs: Vec<f32> = climbs.into_iter().map(|[dx, dy]| dx.hypot(dy)).collect();
+        let ends_mm = [
+            low.iter().fold(f32::INFINITY, |least, z| least.min(*z)),
+            high.iter().fold(f32::NEG_INFINITY, |most, z| most.max(*z)),
+        ];
         let slopes = spread(&climbs, across, down, 1);
         let size_mm = PATCH as f64 * step_mm;
         let mut patches: Vec<Patch> = (0..across * down)
@@ -109,7 +97,12 @@ impl<'a> Relief<'a> {
                 break;
             }
         }
-        Relief { heights, step_mm, steepest, across, patches }
+        Relief { heights, step_mm, steepest, across, patches, ends_mm }
+    }
+
+    /// Lowest and highest z, infinity and minus infinity where there is no data.
+    pub(super) fn ends_mm(&self) -> [f32; 2] {
+        self.ends_mm
     }
 
     /// Distance of the samples in mm.
@@ -213,6 +206,64 @@ impl<'a> Relief<'a> {
         }
         // Over all that the window shows; past it the steepest face could stand.
         if climb > self.steepest { End::Clear } else { End::Unknown }
+    }
+}
+
+/// Lowest, highest and steepest of the samples of a patch, a column to each place.
+struct Looked {
+    least: [f32; PATCH],
+    most: [f32; PATCH],
+    /// Climbs to the right and upwards.
+    across: [f32; PATCH],
+    up: [f32; PATCH],
+}
+
+impl Looked {
+    /// Of the patch whose first sample this is.
+    fn over(heights: &Heights, column: usize, row: usize) -> Looked {
+        let Window { columns, rows, .. } = heights.window;
+        let mut looked = Looked {
+            least: [f32::INFINITY; PATCH],
+            most: [f32::NEG_INFINITY; PATCH],
+            across: [0.0; PATCH],
+            up: [0.0; PATCH],
+        };
+        for row in row..(row + PATCH).min(rows) {
+            let line = &heights.z_mm[row * columns..(row + 1) * columns];
+            let above = heights.z_mm.get((row + 1) * columns..(row + 2) * columns).unwrap_or(line);
+            let (z, right) = (&line[column..], line.get(column + 1..).unwrap_or(&[]));
+            match (z.first_chunk(), right.first_chunk(), above[column..].first_chunk()) {
+                (Some(z), Some(right), Some(above)) => looked.take(z, right, above),
+                _ => {
+                    // At the right edge there is nothing more.
+                    let mut ends = [[f32::NAN; PATCH]; 3];
+                    for (to, from) in ends.iter_mut().zip([z, right, &above[column..]]) {
+                        to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+                    }
+                    looked.take(&ends[0], &ends[1], &ends[2]);
+                }
+            }
+        }
+        looked
+    }
+
+    /// Comparisons leave out NaN.
+    #[inline(always)]
+    fn take(&mut self, z: &[f32; PATCH], right: &[f32; PATCH], above: &[f32; PATCH]) {
+        for k in 0..PATCH {
+            let (across, up) = ((right[k] - z[k]).abs(), (above[k] - z[k]).abs());
+            self.least[k] = if z[k] < self.least[k] { z[k] } else { self.least[k] };
+            self.most[k] = if z[k] > self.most[k] { z[k] } else { self.most[k] };
+            self.across[k] = if across > self.across[k] { across } else { self.across[k] };
+            self.up[k] = if up > self.up[k] { up } else { self.up[k] };
+        }
+    }
+
+    /// Lowest, highest, and a climb from sample to sample that none exceeds.
+    fn ends(&self) -> (f32, f32, f32) {
+        let most = |of: &[f32; PATCH]| of.iter().fold(f32::NEG_INFINITY, |most, z| most.max(*z));
+        let least = self.least.iter().fold(f32::INFINITY, |least, z| least.min(*z));
+        (least, most(&self.most), most(&self.across).hypot(most(&self.up)))
     }
 }
 
