@@ -39,6 +39,11 @@ const ALLOWANCE: f64 = 0.01;
 /// Samples of a block that share offsets, at least, for these to be looked for.
 pub(super) const MANY: u32 = 12;
 
+/// How far the rises of samples on one facet may differ, and of those of a block that are taken at once, in those that
+/// are alike.
+const FACET: f32 = 4.0;
+const SPREAD: f32 = 35.0;
+
 /// Samples of a block on a facet that is known already, at least, to be taken at once.
 const SOME: u32 = 2;
 
@@ -49,8 +54,8 @@ pub(super) trait Touch<V: Vectors, P: Pairs> {
 
     fn nowhere(&self) -> Self::At;
 
-    /// Those of samples with these rises, if they are few.
-    fn few(&self, rises: &Rises) -> Option<Self::At>;
+    /// Those of samples with these rises, if they are few, and whether they are so few that samples share a facet.
+    fn few(&self, rises: &Rises) -> Option<(Self::At, bool)>;
 
     /// Offsets along y, at least, at which samples with these rises can touch.
     fn rows(&self, rises: &Rises) -> [f64; 2];
@@ -136,7 +141,7 @@ fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
 ) -> bool {
     let mut known = std::mem::take(&mut progress.known);
     if known.is_empty() {
-        let none = Known { rises: Rises::NO_SAMPLE, at: touch.nowhere() };
+        let none = Known { rises: Rises::NO_SAMPLE, at: touch.nowhere(), is_facet: true };
         known.resize(field.columns.div_ceil(LANES) + 1, [none; 2]);
     }
     let radius = profile.radius();
@@ -202,6 +207,8 @@ impl<At> Progress<At> {
 struct Known<At> {
     rises: Rises,
     at: At,
+    /// Of one facet; else of an edge that is blunt enough for its samples to be taken as one.
+    is_facet: bool,
 }
 
 /// Blocks side by side with the same offsets.
@@ -231,7 +238,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
     /// All blocks of some rows.
     #[inline(always)]
     fn rows(&mut self, a: i64, rows: usize, out: &mut Targets) {
-        let none = Known { rises: Rises::NO_SAMPLE, at: self.touch.nowhere() };
+        let none = Known { rises: Rises::NO_SAMPLE, at: self.touch.nowhere(), is_facet: true };
         let mut level = Level { first: 0, len: 0, known: none };
         for column in 0..self.known.len() - 1 {
             let block = Block { a, first: column * LANES, rows };
@@ -239,7 +246,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 self.raise_level(a, rows, &mut level, out);
                 continue;
             };
-            if level.len > 0 && level.known.rises.holds(&all) {
+            if level.len > 0 && level.known.is_facet && level.known.rises.holds(&all) {
                 level.len += LANES;
                 self.known[column][0] = level.known;
                 continue;
@@ -256,7 +263,9 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
             self.raise_level(a, rows, &mut level, out);
             match known {
                 Some(known) => {
-                    self.known[column][0] = known;
+                    if known.is_facet {
+                        self.known[column][0] = known;
+                    }
                     level = Level { first: block.first, len: LANES, known };
                 }
                 None => {
@@ -282,11 +291,12 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
     /// The offsets of a block, if they are few.
     #[inline(always)]
     fn facet(&self, all: &Rises, grain_mm: f32) -> Option<Known<T::At>> {
-        if all.spread() > 4.0 * self.alike_mm {
+        if all.spread() > SPREAD * self.alike_mm {
             return None;
         }
         let rises = all.wider(greater(0.12 * self.alike_mm, grain_mm));
-        self.touch.few(&rises).map(|at| Known { rises, at })
+        let alike = all.spread() <= FACET * self.alike_mm;
+        self.touch.few(&rises).map(|(at, few)| Known { rises, at, is_facet: few && alike })
     }
 
     /// Whether samples of this block may reach any target.
@@ -377,7 +387,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 bits &= bits - 1;
             }
             let seed = self.lanes.at(r, bits.trailing_zeros() as usize);
-            let Some(known) = self.facet(&seed, grain_mm) else { break };
+            let Some(known) = self.facet(&seed, grain_mm).filter(|known| known.is_facet) else { break };
             let held = self.lanes.held::<V>(left, &known.rises);
             let count = count(&held);
             for (left, held) in left.iter_mut().zip(&held) {

@@ -135,10 +135,10 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Listed<'_, V> {
     }
 
     #[inline(always)]
-    fn few(&self, rises: &Rises) -> Option<Spots> {
+    fn few(&self, rises: &Rises) -> Option<(Spots, bool)> {
         let mut spots = NOWHERE;
         let slopes = self.cones.slopes(rises);
-        let Some(around) = self.cones.around(&slopes) else { return Some(spots) };
+        let Some(around) = self.cones.around(&slopes) else { return Some((spots, true)) };
         let of = self.cones.of(&slopes);
         let [mut first, high] = around.y;
         while first <= high {
@@ -168,7 +168,7 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Listed<'_, V> {
             }
             first += LANES as i32;
         }
-        Some(spots)
+        Some((spots, true))
     }
 
     #[inline(always)]

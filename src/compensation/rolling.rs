@@ -30,6 +30,12 @@ pub(super) const WIDE: f64 = 100.0;
 /// Lattice points of a block's box, at most, for it to be used for all its samples.
 const FEW: f64 = 9.0;
 
+/// The same for a block with an edge in it to be taken at once: splitting it is about as much work.
+const BLUNT: f64 = 100.0;
+
+/// Columns of such a box at most: the padding of a field holds a tile and as much again.
+const WIDEST: f64 = 2.0 * LANES as f64;
+
 /// Samples of a block from which boxes are shared by any that have nearly the same.
 const MOST: u32 = 40;
 
@@ -58,10 +64,14 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
     }
 
     #[inline(always)]
-    fn few(&self, rises: &Rises) -> Option<Reachable> {
+    fn few(&self, rises: &Rises) -> Option<(Reachable, bool)> {
         match self.ball.reachable(rises) {
-            None => Some(Reachable { x: [1.0, 0.0], y: [1.0, 0.0] }),
-            Some(at) => (at.lattice_points() <= FEW).then_some(at),
+            None => Some((Reachable { x: [1.0, 0.0], y: [1.0, 0.0] }, true)),
+            Some(at) => {
+                let points = at.lattice_points();
+                let fits = points <= BLUNT && at.x[1] - at.x[0] <= WIDEST;
+                fits.then_some((at, points <= FEW))
+            }
         }
     }
 
@@ -129,8 +139,10 @@ fn raise<V: Vectors, P: Pairs>(
     out: &mut Targets,
 ) -> usize {
     if let Some(samples) = on.pairs.on_samples() {
-        raise_spans::<V>(on.field, samples, a, spans, &Offsets::of(at), out);
-        return BLOCK_WORK;
+        let offsets = Offsets::of(at);
+        raise_spans::<V>(on.field, samples, a, spans, &offsets, out);
+        let taps = offsets.taps() * spans.iter().map(|[_, len]| len).sum::<usize>() / LANES;
+        return BLOCK_WORK.max(taps);
     }
     for (r, &[first, len]) in spans.iter().enumerate() {
         if len > 0 {

@@ -113,6 +113,13 @@ impl Offsets {
         let whole = |[low, high]: [f64; 2]| [low.ceil() as i32, high.floor() as i32];
         Offsets { x: whole(at.x), y: whole(at.y) }
     }
+
+    /// How many they are.
+    #[inline(always)]
+    pub fn taps(&self) -> usize {
+        let count = |[low, high]: [i32; 2]| (high - low + 1).max(0) as usize;
+        count(self.x) * count(self.y)
+    }
 }
 
 /// Samples of a row of a block: the first one's column, and how many.
