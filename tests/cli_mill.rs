@@ -329,6 +329,10 @@ fn the_light_of_a_polished_cut_stands_beside_that_of_the_cut() {
     let bench = Bench::with(&[("[limits]", "[polish]\nremoval_um = -1\n[limits]")]);
     bench.run("mill job.toml --out out --quiet").code(2).stderr(contains("polish.removal_um"));
     assert!(!bench.path("out").exists());
+    let die = ("step_mm = 0.02", "step_mm = 0.02\nform = \"die\"");
+    let report = Bench::with(&[die, ("[limits]", "[polish]\nremoval_um = 1\n[limits]")]).mill(0);
+    let findings = report["findings"].as_array().expect("findings");
+    assert!(findings.iter().any(|finding| finding["code"] == "polish"), "a die has no light: {findings:?}");
 }
 
 #[test]

@@ -156,14 +156,18 @@ impl Part {
 
     /// Refuses a limit on the light of a part that has none.
     pub fn check_light(&self, job: &Job) -> Result<(), Error> {
-        let what = match (&self.scene, job.part.form) {
-            (None, _) => "not designed from a scene",
-            (_, Form::Die) => "a die, which reflects nothing",
-            _ => return Ok(()),
-        };
-        match job.limits.on_audience_min {
-            Some(limit) => Err(Error::NoLight { limit, what }),
-            None => Ok(()),
+        match (self.lightless(job), job.limits.on_audience_min) {
+            (Some(what), Some(limit)) => Err(Error::NoLight { limit, what }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Why no light is followed from the part, if it is not.
+    pub fn lightless(&self, job: &Job) -> Option<&'static str> {
+        match (&self.scene, job.part.form) {
+            (None, _) => Some("not designed from a scene"),
+            (_, Form::Die) => Some("a die, which reflects nothing"),
+            _ => None,
         }
     }
 

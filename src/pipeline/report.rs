@@ -112,6 +112,11 @@ fn of_shop(job: &Job, shop: &Shop, part: &Part) -> Vec<Finding> {
         );
         found.push(finding(Severity::Warning, "unconfirmed", message));
     }
+    if let (Some(_), Some(what)) = (job.polish, part.lightless(job)) {
+        let message =
+            format!("[polish] is left out: it is a model of light after polishing, and the part is {what}");
+        found.push(finding(Severity::Warning, "polish", message));
+    }
     found.extend(of_stepdowns(job, shop));
     if job.part.form == Form::Die {
         let message = of_a_die(part.design.as_ref().map(|design| design.seam));
