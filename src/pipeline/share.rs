@@ -1,5 +1,6 @@
 //! A share of a tile's area, spread evenly, and how far what is measured on it may be from the whole.
 
+use crate::fidelity::light::draw;
 use crate::grid::{Lattice, Window};
 
 /// Samples along a side of a square that is looked at: two or three cells of a screen, more than most cutters reach.
@@ -28,18 +29,10 @@ pub fn squares(lattice: &Lattice, share: f64) -> Vec<Window> {
     (0..strata)
         .filter_map(|stratum| {
             let (start, end) = (first(stratum), first(stratum + 1));
-            let drawn = start + (scattered(stratum as u64) % (end - start).max(1) as u64) as usize;
-            all.get(drawn).copied()
+            let [part, ..] = draw(stratum as i64, 0, 0);
+            all.get(start + (part * (end - start) as f64) as usize).copied()
         })
         .collect()
-}
-
-/// A number that has nothing to do with its neighbours' (SplitMix64, Steele et al. 2014, doi 10.1145/2714064.2660195).
-fn scattered(n: u64) -> u64 {
-    let mut z = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// Standard error of the ratio of two sums over squares, `(part, of)` each in the order of [`squares`], that were
@@ -97,21 +90,20 @@ mod tests {
     /// Of a figure that drifts over the tile and has noise, nine of ten estimates lie within two standard errors.
     #[test]
     fn the_error_is_about_what_it_says() {
-        let noise = |n: u64| scattered(n) as f64 / u64::MAX as f64 - 0.5;
-        let of = |n: usize, set: u64| 0.3 + n as f64 * 5e-4 + 0.2 * noise(n as u64 + 1000 * set);
+        let of = |n: i64, set: i64| 0.3 + n as f64 * 5e-4 + 0.2 * (draw(n, set, 1)[0] - 0.5);
         let (mut within, sets) = (0, 200);
         for set in 0..sets {
             let all: Vec<f64> = (0..400).map(|n| of(n, set)).collect();
             let truth = all.iter().sum::<f64>() / 400.0;
             let drawn: Vec<(f64, f64)> = (0..40)
                 .map(|stratum| {
-                    let nth = scattered(stratum + 77 * set) % 10;
+                    let nth = (10.0 * draw(stratum, set, 2)[0]) as i64;
                     (all[(stratum * 10 + nth) as usize], 1.0)
                 })
                 .collect();
             let mean = drawn.iter().map(|square| square.0).sum::<f64>() / 40.0;
             let error = standard_error(&drawn, 0.1).expect("40 squares");
-            within += u64::from((mean - truth).abs() < 2.0 * error);
+            within += i64::from((mean - truth).abs() < 2.0 * error);
         }
         assert!(within * 10 > 9 * sets && within < sets, "{within} of {sets}");
     }

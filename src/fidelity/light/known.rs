@@ -182,9 +182,8 @@ mod tests {
 
     use super::*;
     use crate::compensation::{Profile, closing};
-    use crate::fidelity::light::Metal;
+    use crate::fidelity::light::{Metal, body};
     use crate::optics::{ComplexIndex, Reflectance};
-    use crate::screen::Polyhedron;
 
     const STEP_MM: f64 = 0.01;
 
@@ -204,16 +203,6 @@ mod tests {
         heights
     }
 
-    fn solid(centre: DVec3, half: f64) -> Polyhedron {
-        let corners: Vec<DVec3> = (0..8)
-            .map(|k| {
-                let side = |bit: i32| if k & bit == 0 { -half } else { half };
-                centre + DVec3::new(side(1), side(2), side(4))
-            })
-            .collect();
-        Polyhedron::hull("body", &corners).expect("a solid")
-    }
-
     fn apart(a: &LightTally, b: &LightTally) -> f64 {
         assert_eq!((a.samples, a.shadowed), (b.samples, b.shadowed));
         let sums = |t: &LightTally| [t.incident, t.on_audience, t.leak, t.absorbed, t.unresolved];
@@ -229,7 +218,7 @@ mod tests {
         let window = Window { column: 0, row: 20, columns: 568, rows: 388 };
         let around = facets(Window { column: -56, row: -36, columns: 680, rows: 500 });
         let design = around.crop(near);
-        let audience = [solid(DVec3::new(0.3, 0.1, 3.0), 0.4), solid(DVec3::new(-1.0, 0.2, 3.5), 0.5)];
+        let audience = [body(DVec3::new(0.3, 0.1, 3.0), 0.4), body(DVec3::new(-1.0, 0.2, 3.5), 0.5)];
         let rotation = DMat3::from_rotation_x(0.1) * DMat3::from_rotation_y(-0.15);
         let pose = Pose { origin_m: DVec3::new(0.1, -0.2, 0.05), rotation };
         let aluminium = Reflectance::Metal(ComplexIndex { n: 1.0, k: 6.4 });

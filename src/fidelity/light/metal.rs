@@ -88,7 +88,7 @@ impl Metal {
 
 /// Numbers of 0..1 that depend on a sample and a bounce only.
 #[inline]
-pub(super) fn draw(column: i64, row: i64, bounce: u64) -> [f64; 3] {
+pub(crate) fn draw(column: i64, row: i64, bounce: u64) -> [f64; 3] {
     // SplitMix64 (Steele, Lea and Flood 2014, doi 10.1145/2660193.2660195).
     let mut state = (column as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ (row as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F).rotate_left(29)

@@ -17,6 +17,7 @@ mod view;
 
 pub use known::Known;
 pub use metal::Metal;
+pub(crate) use metal::draw;
 pub use planes::{Plane, planes};
 pub use relief::{End, Relief};
 pub use tally::{LightTally, ROOM_BINS, Shares};
@@ -107,4 +108,16 @@ impl<'a> Stage<'a> {
         let at = self.far_field.map_or(p_mm, |centres| centres.near(p_mm.x, p_mm.y));
         (at - self.middle_mm) * 1e-3
     }
+}
+
+/// An upright cube that stands for an audience.
+#[cfg(test)]
+fn body(centre: DVec3, half: f64) -> Polyhedron {
+    let corners: Vec<DVec3> = (0..8)
+        .map(|k| {
+            let side = |bit: i32| if k & bit == 0 { -half } else { half };
+            centre + DVec3::new(side(1), side(2), side(4))
+        })
+        .collect();
+    Polyhedron::hull("body", &corners).expect("a solid")
 }

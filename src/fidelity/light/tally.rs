@@ -160,7 +160,7 @@ mod tests {
     use glam::{DMat3, DVec3};
 
     use super::super::lit::Lit;
-    use super::super::{Metal, Pose, Room};
+    use super::super::{Metal, Pose, Room, body};
     use super::*;
     use crate::fidelity::pixels::Pixels;
     use crate::grid::{Heights, Window};
@@ -193,16 +193,6 @@ mod tests {
         let mut tally = LightTally::default();
         tally.add(heights, inner, 0.01, &pose, &room, None);
         tally
-    }
-
-    fn body(centre: DVec3, half: f64) -> Polyhedron {
-        let corners: Vec<DVec3> = (0..8)
-            .map(|k| {
-                let side = |bit: i32| if k & bit == 0 { -half } else { half };
-                centre + DVec3::new(side(1), side(2), side(4))
-            })
-            .collect();
-        Polyhedron::hull("body", &corners).expect("a solid")
     }
 
     fn sum(shares: Shares) -> f64 {
