@@ -280,7 +280,8 @@ fn check_says_of_a_cutter_what_light_says_of_its_closing() {
     for share in ["0", "1.5", "nan", "half"] {
         bench.run(&format!("check job.toml --share {share}")).code(2).stderr(contains("share of the area"));
     }
-    bench.run("check job.toml --share 0.5 --out checked").code(2);
+    bench.run("check job.toml --share 0.5 --out checked").code(said.get_output().status.code().unwrap_or(2));
+    assert!(bench.path("checked/maps").is_dir(), "maps are of all of it");
     bench.run("design screen.toml --out d.npz --cells 324 149 325 150 --quiet").success();
     let cutters = checked["cutters"].as_array().expect("cutters");
     let mut before = 1.0;

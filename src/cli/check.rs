@@ -16,9 +16,11 @@ pub struct Arguments {
     /// Folder for check.json and the maps of what stays unreachable
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Part of the area to look at, in squares of 1024 samples that are spread evenly; figures then have a standard error
-    #[arg(long, value_name = "FRACTION", default_value_t = 1.0, value_parser = share, conflicts_with = "out")]
-    share: f64,
+    /// Part of the area to look at, in squares of 1024 samples that are spread evenly; figures of less than 1, all of it,
+    /// have a standard error. Left out: all of parts up to 64 million samples; of larger ones so many under each
+    /// cutter, and all of it under the set that they come to
+    #[arg(long, value_name = "FRACTION", value_parser = share)]
+    share: Option<f64>,
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -60,8 +62,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         );
         if let Some(fraction) = checked.looked_at_fraction {
             println!(
-                "{:.1} % of the area was looked at: the deepest is the deepest there, and after +- stands a standard error",
-                100.0 * fraction
+                "{:.1} % of the area was looked at{}: the deepest is the deepest there, and after +- stands a standard error",
+                100.0 * fraction,
+                match &checked.smallest_set {
+                    Some(set) if set.standard_error.is_none() =>
+                        " under each cutter, all of it under the set",
+                    _ => "",
+                }
             );
         }
         for finding in &checked.findings {

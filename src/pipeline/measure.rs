@@ -42,6 +42,15 @@ pub(super) struct Looked {
     pub on_audience: f64,
 }
 
+/// What was measured of some sets over all tiles.
+pub(super) struct OfSets {
+    pub sets: Vec<Measured>,
+    /// Block by block, how many samples each combination of the sets reaches.
+    pub masks: Vec<Vec<u64>>,
+    /// Of the design.
+    pub designed: LightTally,
+}
+
 impl Measured {
     fn new(params: fidelity::Params) -> Measured {
         Measured { tally: Tally::new(params), light: LightTally::default(), squares: Vec::new() }
@@ -85,16 +94,14 @@ impl Facts<'_> {
         fidelity::Params { step_mm: self.job.part.step_mm, limit_mm }
     }
 
-    /// Tallies of each set over all tiles, how many samples each combination of single cutters reaches, and the
-    /// light of the design.
-    pub(super) fn measure(
-        &self,
-        sets: &[Vec<usize>],
-        progress: &dyn Progress,
-    ) -> Result<(Vec<Measured>, Vec<u64>, LightTally), Error> {
-        let mut totals: Vec<Measured> = sets.iter().map(|_| Measured::new(self.params())).collect();
-        let mut masks = vec![0u64; 1 << sets.len().min(MOST_CUTTERS)];
-        let mut designed = LightTally::default();
+    /// Measures each set over all tiles.
+    pub(super) fn measure(&self, sets: &[Vec<usize>], progress: &dyn Progress) -> Result<OfSets, Error> {
+        let new = |_| Measured::new(self.params());
+        let mut of = OfSets {
+            sets: sets.iter().map(new).collect(),
+            masks: Vec::new(),
+            designed: LightTally::default(),
+        };
         for tile in self.tiles {
             let sight = self.sight(tile);
             for row in self.windows(tile) {
@@ -110,17 +117,15 @@ impl Facts<'_> {
                     })
                     .collect::<Result<_, Error>>()?;
                 for (sets, counts, light) in measured {
-                    for (total, set) in totals.iter_mut().zip(&sets) {
+                    for (total, set) in of.sets.iter_mut().zip(&sets) {
                         total.add(set);
                     }
-                    for (sum, count) in masks.iter_mut().zip(counts) {
-                        *sum += count;
-                    }
-                    designed.merge(&light);
+                    of.masks.push(counts);
+                    of.designed.merge(&light);
                 }
             }
         }
-        Ok((totals, masks, designed))
+        Ok(of)
     }
 
     fn sight(&self, tile: &TileSetup) -> Option<Sight<'_>> {
