@@ -205,7 +205,6 @@ fn judged(
             programs.map(|p| Judged::new(&p.reading, shop.tools[p.operation].shape, zero_mm)).collect()
         })
         .collect();
-    let nose_mm = shop.machine.spindle.nose_diameter_mm;
     let cutters = distinct(reaching(shop).into_iter(), step_mm)?;
     let (names, candidates) = candidates(shop, step_mm)?;
     let steepest = part.whole.steepest();
@@ -230,34 +229,43 @@ fn judged(
     progress.begin("judge", (lattice.columns * lattice.rows) as u64);
     let offset_mm = tile.piece.origin_mm.z;
     let mut maps = Maps::create(staging, &tile.setup.tile.name, &lattice, job.maps.full, offset_mm)?;
-    let mut verdict = judge(&case, progress, &mut |strip| maps.push(&strip))?;
+    // Shanks and holders are followed by one thread, beside the blocks.
+    let (verdict, mut hits) = rayon::join(
+        || judge(&case, progress, &mut |strip| maps.push(&strip)),
+        || body_hits(shop, &blank, &tops, &judged, progress),
+    );
+    let mut verdict = verdict?;
     progress.begin("smaller cutters", 1);
     try_candidates(surface, &candidates, &mut verdict.cavities.cavities)?;
     shift(&mut verdict.cavities.cavities, [tile.setup.tile.x_mm, tile.setup.tile.y_mm]);
     progress.begin("maps", 1);
     let at = &tile.setup.tile;
-    let (maps, map_factor) = maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict))?;
-    let mut on_audience = None;
-    if let Some(pictures) = verdict.pictures.take() {
-        draw_means(staging, job, &tile, &verdict, &pictures, lattice.step_mm)?;
-        let of_cells = |scene: &Scene, maps: &[Pixels; 2]| {
-            maps.each_ref().map(|map| light::of_cells(scene, map, job.part.step_mm))
-        };
-        on_audience =
-            part.scene.as_ref().zip(pictures.light.as_ref()).map(|(scene, maps)| of_cells(scene, maps));
-    }
-    progress.begin("shanks", 1);
+    let pictures = verdict.pictures.take();
+    let (finished, drawn) = rayon::join(
+        || maps.finish(&job.name, [at.x_mm, at.y_mm], &notes(job, &verdict)),
+        || match &pictures {
+            Some(pictures) => draw_means(staging, job, &tile, &verdict, pictures, lattice.step_mm),
+            None => Ok(()),
+        },
+    );
+    let (maps, map_factor) = finished?;
+    drawn?;
+    let of_cells = |scene: &Scene, maps: &[Pixels; 2]| {
+        maps.each_ref().map(|map| light::of_cells(scene, map, job.part.step_mm))
+    };
+    let light = pictures.as_ref().and_then(|pictures| pictures.light.as_ref());
+    let on_audience = part.scene.as_ref().zip(light).map(|(scene, maps)| of_cells(scene, maps));
     let mut motions = Vec::new();
     let mut slots = Vec::new();
     for (nth, (post, judged)) in posts.iter().zip(&judged).enumerate() {
-        let bodies: Vec<_> = tops[nth].iter().map(|p| shop.tools[p.operation].cylinders(nose_mm)).collect();
-        let hits = verify::body_hits(&blank, judged, &bodies);
-        let top = judged.iter().zip(hits).zip(&verdict.cuts[nth]).map(|((judged, body_hit), &cut)| Motions {
-            cut,
-            lateral_rapid: judged.lateral_rapid(&blank),
-            body_hit,
-            thin: None,
-        });
+        let top = judged.iter().zip(std::mem::take(&mut hits[nth])).zip(&verdict.cuts[nth]).map(
+            |((judged, body_hit), &cut)| Motions {
+                cut,
+                lateral_rapid: judged.lateral_rapid(&blank),
+                body_hit,
+                thin: None,
+            },
+        );
         let under: Vec<&plan::Program> = post.programs.iter().filter(up(Face::Underside)).collect();
         let mut of_faces = (top, underside::judge(shop, &tile, &under)?.into_iter());
         let in_order = post.programs.iter().filter_map(|program| match program.face {
@@ -281,6 +289,25 @@ fn judged(
         on_audience,
         findings: Vec::new(),
     })
+}
+
+/// For each post and program, where a shank or holder runs into metal.
+fn body_hits(
+    shop: &Shop,
+    blank: &Blank,
+    programs: &[Vec<&plan::Program>],
+    judged: &[Vec<Judged>],
+    progress: &dyn Progress,
+) -> Vec<Vec<Option<BodyHit>>> {
+    let nose_mm = shop.machine.spindle.nose_diameter_mm;
+    let of_post = |(programs, judged): (&Vec<&plan::Program>, &Vec<Judged>)| {
+        if progress.interrupted() {
+            return vec![None; programs.len()];
+        }
+        let bodies: Vec<_> = programs.iter().map(|p| shop.tools[p.operation].cylinders(nose_mm)).collect();
+        verify::body_hits(blank, judged, &bodies)
+    };
+    programs.iter().zip(judged).map(of_post).collect()
 }
 
 /// Pictures of the normals' errors and of lost light.

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
+
 use super::Error;
 use super::judge::Strip;
 use crate::grid::{Heights, Lattice, Window};
@@ -79,12 +81,13 @@ impl Maps {
             writer.finish()?;
         }
         let factor = self.reducer.factor();
-        for kind in Kind::ALL {
-            let caption =
-                Caption { part: part.into(), tile: self.tile.clone(), origin_mm, notes: notes.to_vec() };
-            let path = self.folder.join(format!("{}-{}.png", self.tile, kind.name()));
-            picture::write_png(&path, &self.preview.draw(kind, &caption))?;
-        }
+        let caption =
+            Caption { part: part.into(), tile: self.tile.clone(), origin_mm, notes: notes.to_vec() };
+        let (folder, tile, preview) = (&self.folder, &self.tile, &self.preview);
+        Kind::ALL.into_par_iter().try_for_each(|kind| {
+            let path = folder.join(format!("{tile}-{}.png", kind.name()));
+            picture::write_png(&path, &preview.draw(kind, &caption))
+        })?;
         let name = |kind: Kind| format!("maps/{}-{}.tif", self.tile, kind.name());
         let [design, machined, deviation, cavity] = Kind::ALL.map(name);
         Ok((MapFiles { design, machined, deviation, cavity }, factor))
