@@ -153,6 +153,7 @@ fn cases() -> Vec<(&'static str, &'static str, Vec<u8>, &'static str)> {
         ("npy-claims-much", "claim.npy", f4("(4000000000, 4000000000)"), "--pixel-mm 0.1"),
         ("npy-wide", "wide.npy", f4("(2, 20000000)"), "--pixel-mm 0.1"),
         ("npy-no-pitch", "pitch.npy", f4("(2, 2)"), ""),
+        ("out-is-part", "same.npy", f4("(2, 2)"), "--pixel-mm 0.1 --out same.npy"),
         ("npy-nothing", "nothing.npy", f4("(0, 2)"), "--pixel-mm 0.1"),
         ("png-garbage", "garbage.png", b"no picture at all".to_vec(), "--pixel-mm 0.1"),
         ("png-colour", "colour.png", png(ColorType::Rgb, BitDepth::Eight, &[0; 24]), "--pixel-mm 0.1"),

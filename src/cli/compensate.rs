@@ -59,6 +59,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     if let Some(nth) = (1..named.len()).find(|nth| named[..*nth].contains(&named[*nth])) {
         return Err(NamedTwice { path: named[nth].display().to_string() }.into());
     }
+    arguments.part.stays(&named)?;
     let every = arguments.every;
     if every == 0 {
         return Err(compensation::Error::Every { every }.into());

@@ -1,6 +1,6 @@
 //! What a command says about the part it reads, beside its file name.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use screenmill::surface::{Options, Unit, Up};
 
@@ -29,7 +29,27 @@ pub struct Part {
     pub z_max_mm: Option<f64>,
 }
 
+/// A part that would be lost.
+#[derive(Debug, thiserror::Error)]
+#[error("{path} is the part that is read; hint: another name for what is written")]
+pub struct Overwrites {
+    path: String,
+}
+
+/// Whether two names are one file that there is.
+pub fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
 impl Part {
+    /// None of these files takes the part's place.
+    pub fn stays(&self, written: &[&PathBuf]) -> Result<(), Overwrites> {
+        match written.iter().find(|path| same_file(&self.part, path)) {
+            Some(path) => Err(Overwrites { path: path.display().to_string() }),
+            None => Ok(()),
+        }
+    }
+
     pub fn options(&self) -> Options {
         Options {
             step_mm: self.step_mm,

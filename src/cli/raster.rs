@@ -25,6 +25,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
+    arguments.part.stays(&[&arguments.out])?;
     let Opened { surface, kind, mut notes } = open(&arguments.part.part, &arguments.part.options())?;
     let lattice = surface.lattice();
     let range_mm = png_range(arguments, surface.as_ref(), &mut notes);

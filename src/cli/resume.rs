@@ -8,6 +8,7 @@ use screenmill::resume;
 use screenmill::whole::Whole;
 use serde_json::json;
 
+use super::part::same_file;
 use super::program::reading_options;
 use super::{Common, Outcome, Refusal};
 
@@ -84,10 +85,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
         );
     }
     Ok(Outcome::Within)
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Whole or not at all.
