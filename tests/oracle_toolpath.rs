@@ -4,8 +4,10 @@ mod relief;
 
 use proptest::prelude::*;
 use relief::{Relief, Stock, assert_rules, site};
+use screenmill::grid::{Heights, Lattice, Window};
+use screenmill::surface::Surface;
 use screenmill::toolpath::finish::{self, Pattern, Spacing};
-use screenmill::toolpath::{Site, Toolpath, rough};
+use screenmill::toolpath::{Axis, Kind, Site, Toolpath, rough};
 
 const STEP: f64 = 0.01;
 const GOUGE: f64 = 0.002;
@@ -217,6 +219,100 @@ fn scallop_height_is_kept_on_the_steepest_face() {
         // Measured in z, a scallop on a slope is 1 / cos(slope) as high.
         let limit = 0.001 * 1.0f64.hypot(slope) + screenmill::tolerance::EXCESS_MM + 0.0001;
         assert!(most <= limit && most > 0.0005, "slope {slope}, {direction_deg}: {most} of {limit}");
+    }
+}
+
+/// A plane without end, under a tile.
+struct Plane {
+    lattice: Lattice,
+    slopes: [f64; 2],
+}
+
+impl Plane {
+    fn at(&self, x: f64, y: f64) -> f64 {
+        self.slopes[0] * x + self.slopes[1] * y
+    }
+}
+
+impl Surface for Plane {
+    fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+    fn top_mm(&self) -> f64 {
+        self.at(self.lattice.width_mm, 0.0)
+    }
+    fn bottom_mm(&self) -> f64 {
+        self.at(0.0, self.lattice.height_mm)
+    }
+    fn steepest(&self) -> [f64; 2] {
+        self.slopes.map(f64::abs)
+    }
+    fn heights(&self, window: Window, datum_mm: f64) -> Result<Heights, screenmill::surface::Error> {
+        let (rows, columns) = (window.row..window.row_end(), window.column..window.column_end());
+        let place = |row: i64, column: i64| self.at(self.lattice.x_mm(column), self.lattice.y_mm(row));
+        let z_mm =
+            rows.flat_map(|row| columns.clone().map(move |column| (place(row, column) - datum_mm) as f32));
+        Ok(Heights { window, z_mm: z_mm.collect() })
+    }
+    fn outlines(&self, _low_mm: [f64; 2], _high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
+        let corners = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]];
+        vec![corners.map(|[x, y]| [x, y, self.at(x, y)]).to_vec()]
+    }
+}
+
+/// What `rounding-tilt` tells, against the moves themselves: on a plane each pass is one mirror, and how far it is turned
+/// is how much farther its end stands from the plane than its begin. Beside its line, where a slanted pass stands on a
+/// coarse grid, the plane is higher or lower.
+#[test]
+fn mirrors_are_turned_by_what_the_path_says() {
+    let plane = Plane { lattice: Lattice::covering(0.9, 0.8, STEP), slopes: [0.23, -0.17] };
+    let relief = Relief::new([0.9, 0.8], STEP, plane.steepest(), |x, y| plane.at(x, y));
+    for (unit_mm, direction_deg) in
+        [(0.01, 0.0), (0.01, 30.0), (0.01, 10.0), (0.01, 73.0), (0.01, 45.0), (0.001, 118.0), (0.025, 26.57)]
+    {
+        let site = Site { surface: &plane, ..site(&relief, unit_mm, 0.0) };
+        let params = finish::Params { direction_deg, ..params("ball:1.2", 0.06) };
+        let path = plan(&site, &params);
+        let layout = finish::layout(&site, &params).unwrap();
+        let split = |at: [i32; 3]| if layout.along == Axis::X { [at[0], at[1]] } else { [at[1], at[0]] };
+        let nearest = |at: [i32; 3]| {
+            let [u, v] = split(at).map(f64::from);
+            let away = |k: &usize| (f64::from(layout.passes[*k]) + layout.slope * u - v).abs();
+            (0..layout.passes.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap()
+        };
+        let mut ends: Vec<Vec<[i32; 3]>> = vec![Vec::new(); layout.passes.len()];
+        for pair in path.moves.windows(2) {
+            let (from, to) = (pair[0].to, pair[1].to);
+            if pair[1].kind == Kind::Cut && nearest(from) == nearest(to) && from[..2] != to[..2] {
+                ends[nearest(to)].extend([from, to]);
+            }
+        }
+        let stride = 1.0f64.hypot(layout.slope);
+        let stepover = f64::from(layout.passes[1] - layout.passes[0]) * unit_mm / stride;
+        let passes: Vec<[f64; 2]> = ends
+            .iter()
+            .filter_map(|ends| {
+                let [from, .., to] = ends[..] else { return None };
+                let above = |at: [i32; 3]| {
+                    let [x, y, z] = at.map(|units| f64::from(units) * unit_mm);
+                    z - plane.at(x, y)
+                };
+                let length = f64::from((split(to)[0] - split(from)[0]).abs()) * unit_mm * stride;
+                let deg = ((above(to) - above(from)) / length).atan().to_degrees();
+                (length >= stepover - 1e-9).then_some([deg.abs(), length])
+            })
+            .collect();
+        let case = format!("{unit_mm}, {direction_deg}");
+        assert!(passes.len() > 10, "{case}: {} passes", passes.len());
+        let squares: f64 = passes.iter().map(|[deg, length]| deg * deg * length).sum();
+        let rms = (squares / passes.iter().map(|pass| pass[1]).sum::<f64>()).sqrt();
+        let worst = passes.iter().map(|pass| pass[0]).fold(0.0, f64::max);
+        let tilt = path.tilt.expect("a finish");
+        // 32-bit heights.
+        let near = |told: f64, is: f64| (told - is).abs() < 1e-3;
+        let told = (tilt.rms_deg().expect("mirrors"), tilt.worst.expect("a mirror").deg);
+        assert!(near(told.0, rms) && near(told.1, worst), "{case}: {told:?}, {rms} and {worst}");
+        assert!(worst > 0.0, "{case}");
     }
 }
 

@@ -199,12 +199,10 @@ pub fn programs(
     let lattice = surface.lattice();
     let need = tile.need();
     let cut_mm = need.depth_mm + need.top_allowance_mm;
-    let budget = Budget::split(
-        job.limits.gouge_or_default_mm(),
-        dialect.path_tolerance_mm + dialect.merge_tolerance_mm,
-        steepest,
-        need.depth_mm,
-    )?;
+    let split = |path_tolerance_mm: f64| {
+        Budget::split(job.limits.gouge_or_default_mm(), path_tolerance_mm, steepest, need.depth_mm)
+    };
+    let budget = split(dialect.path_tolerance_mm + dialect.merge_tolerance_mm)?;
     let controllers = shop
         .dialects
         .iter()
@@ -222,6 +220,7 @@ pub fn programs(
         unit_mm: dialect.unit_mm,
         apart_mm: job_grid.apart_mm(dialect.unit_mm),
         budget,
+        tightest: split(job_grid.loosest_mm())?,
     };
     let mut planned = PostPrograms {
         dialect: dialect.name.clone(),

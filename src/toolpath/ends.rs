@@ -15,7 +15,7 @@
 //! the funnel of slopes that stay between the bounds, and the sums of the least squares kept as it goes.
 
 use super::funnel::{Vertex, straighten};
-use super::table::Table;
+use super::table::{Bounds, Table};
 
 /// Both flanks of a pass turn when it is off, each by the difference of two passes: between once and four times
 /// the square of one. The light of a designed tile is best at four, and flat from there on.
@@ -52,9 +52,16 @@ pub(super) fn lay(low: &[f64], high: &[f64], exact: &[f64], measure: &Measure) -
     if low.is_empty() {
         return Vec::new();
     }
-    let mut table = Table::new(low, high, exact, measure);
+    let ends: Vec<[f64; 2]> = low.iter().zip(high).map(|(low, high)| [*low, *high]).collect();
+    let off = vec![[0.0; 2]; low.len()];
+    straighten(lay_between(&Bounds { low, high, ends: &ends, off: &off }, exact, measure))
+}
+
+/// The same where moves may end elsewhere than they may pass.
+pub(super) fn lay_between(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Vec<Vertex> {
+    let mut table = Table::new(bounds, exact, measure);
     table.fill();
-    straighten(table.best())
+    table.best(bounds.off)
 }
 
 #[cfg(test)]
@@ -169,6 +176,40 @@ mod tests {
                 let ((a, za), (b, zb)) = (pair[0], pair[1]);
                 for i in a..=b {
                     let line = f64::from(za) + f64::from(zb - za) * (i - a) as f64 / (b - a) as f64;
+                    prop_assert!(line >= low[i] - 1e-9 && line <= high[i] + 1e-9, "{} at {}", line, i);
+                }
+            }
+        }
+
+        /// Heights off the grid's units, ends that lie elsewhere than what may be passed, and positions where all ends.
+        #[test]
+        fn moves_end_where_they_may(
+            steps in proptest::collection::vec(-1.5..1.5f64, 2..80),
+            raised in proptest::collection::vec(-0.4..0.4f64, 80),
+            off in proptest::collection::vec(-0.9..0.9f64, 81),
+            stops in proptest::collection::vec(0..12usize, 80),
+        ) {
+            let exact: Vec<f64> = steps.iter().scan(0.0, |z, s| { *z += s; Some(*z) }).collect();
+            let count = exact.len();
+            let stop = |i: usize| i == 0 || i + 1 == count || stops[i] == 0;
+            let low: Vec<f64> = (0..count).map(|i| if stop(i) { f64::INFINITY } else { exact[i] }).collect();
+            let high: Vec<f64> =
+                (0..count).map(|i| if stop(i) { f64::NEG_INFINITY } else { exact[i] + 0.9 }).collect();
+            let ends: Vec<[f64; 2]> =
+                exact.iter().zip(&raised).map(|(z, up)| [z + up, z + up + 1.0]).collect();
+            let off: Vec<[f64; 2]> =
+                (0..count).map(|i| [off[i], if stop(i) { off[i + 1] } else { 0.0 }]).collect();
+            let bounds = Bounds { low: &low, high: &high, ends: &ends, off: &off };
+            let vertices = lay_between(&bounds, &exact, &MEASURE);
+            prop_assert_eq!((vertices[0].0, vertices[vertices.len() - 1].0), (0, count - 1));
+            prop_assert!((0..count).filter(|&i| stop(i)).all(|i| vertices.iter().any(|v| v.0 == i)));
+            for pair in vertices.windows(2) {
+                let ((a, za), (b, zb)) = (pair[0], pair[1]);
+                let from = f64::from(za) + off[a][0] + off[a][1];
+                let to = f64::from(zb) + off[b][0];
+                prop_assert!(to >= ends[b][0] - 1e-9 && to <= ends[b][1] + 1e-9, "{} at {}", to, b);
+                for i in a + 1..b {
+                    let line = from + (to - from) * (i - a) as f64 / (b - a) as f64;
                     prop_assert!(line >= low[i] - 1e-9 && line <= high[i] + 1e-9, "{} at {}", line, i);
                 }
             }

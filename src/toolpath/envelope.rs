@@ -17,6 +17,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::passes::{Layout, tip_radius_mm};
+use super::slant::Beside;
 use super::strip::{Ceiling, Strip};
 use crate::compensation::{self, Faces, Profile, RowTarget, Tables};
 use crate::cutter::Shape;
@@ -57,6 +58,8 @@ pub(super) struct Envelope {
     pub(super) bound_mm: Vec<f64>,
     /// The exact cutter location, NaN where nothing is in reach.
     pub(super) cl_mm: Vec<f32>,
+    /// What is known of the heights beside a line that the grid does not meet; empty for other lines.
+    pub(super) beside: Vec<Beside>,
 }
 
 /// By how much a cutter is widened so that it answers for `half_mm` either way along a line.
@@ -171,7 +174,7 @@ impl Cutter {
                 None => steep[i - 1] = true,
             }
         }
-        (Envelope { bound_mm, cl_mm }, steep)
+        (Envelope { bound_mm, cl_mm, beside: Vec::new() }, steep)
     }
 
     /// Whether no interval between these locations asks for more than its chord: the farthest contact that any of them
@@ -265,7 +268,7 @@ impl Cutter {
                         known.fold(f64::NEG_INFINITY, |high, &z| high.max(f64::from(z)))
                     })
                     .collect();
-                Envelope { bound_mm, cl_mm }
+                Envelope { bound_mm, cl_mm, beside: Vec::new() }
             })
             .collect()
     }
@@ -341,6 +344,11 @@ impl Cutter {
     /// What must be added to the chord for contacts up to `contact_mm` from the tip's centre: what bulge
     /// and controller take beyond their shares of the budget. None where only the steep way holds.
     pub(super) fn lift_mm(&self, contact_mm: f64) -> Option<f64> {
+        self.curved_lift_mm(contact_mm, BULGE_MOST * self.pitch_mm)
+    }
+
+    /// The same with the bulge up to which the steep way is not asked for.
+    pub(super) fn curved_lift_mm(&self, contact_mm: f64, most_mm: f64) -> Option<f64> {
         let tip = self.tip_mm;
         let contact = contact_mm + self.pitch_mm;
         let strayed = contact + self.strays_mm();
@@ -359,7 +367,7 @@ impl Cutter {
         };
         let bulge_mm = tip * tip * pitch_mm * pitch_mm / (8.0 * above * above * above);
         // The steep way takes no less sideways.
-        if bulge_mm > BULGE_MOST * self.pitch_mm {
+        if bulge_mm > most_mm {
             return None;
         }
         let controller_mm = self.budget.path_tolerance_mm * tip / centre;

@@ -4,19 +4,18 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::envelope::{Cutter, Envelope};
+use super::envelope::Envelope;
 use super::ground::Ground;
 use super::passes::{contact_radius_mm, tip_radius_mm};
 use super::pen::Pen;
 use super::strip::{Strip, band_length};
+use super::track::Part;
 use super::{
-    Axis, Error, GridPoint, Layout, Progress, Rest, Site, Tilt, Toolpath, ends, funnel, link, slant,
+    Axis, Error, GridPoint, Layout, Progress, Rest, Site, Tilt, Toolpath, ends, funnel, link, slant, tilt,
+    track,
 };
 use crate::cutter::Shape;
 use crate::tolerance::EXCESS_MM;
-
-/// Positions this part of their distance beside a line still make a line.
-const STRAIGHT: f64 = 0.02;
 
 /// How far apart passes lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,8 +109,8 @@ pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
     Ok(Layout::covering(site, (along, slope), stepover as i32, overrun_mm))
 }
 
-/// A cut without a break: vertices along the pass and up, in units.
-type Run = Vec<[i32; 2]>;
+/// A cut without a break: along the passes, across and up, in units.
+type Run = Vec<GridPoint>;
 
 /// Plans the passes of a finishing or semi-finishing operation, band by band.
 ///
@@ -146,8 +145,7 @@ fn passes(
 ) -> Result<Toolpath, Error> {
     let layout = layout(site, params)?;
     let lattice = site.surface.lattice();
-    let cutter =
-        Cutter::new(params.shape, lattice.step_mm, layout.length_mm(), layout.aside_mm(), site.budget)?;
+    let cutter = slant::cutter(params.shape, &layout, site)?;
     let stepover_mm = layout.stepover_mm().unwrap_or(2.0 * params.shape.radius_mm());
     let slanted = layout.slope != 0.0;
     let longest_mm = link::LONGEST_STEPOVERS * stepover_mm;
@@ -195,7 +193,7 @@ fn passes(
                 .collect();
             planned.iter().for_each(|(_, turned)| tilt.merge(turned));
             let band: Vec<Vec<Run>> = planned.into_iter().map(|(runs, _)| runs).collect();
-            let joints = joints(&layout, first, &band, before);
+            let joints = joints(&band, before.map(|(_, at)| at));
             let links: Vec<Option<i32>> = joints
                 .par_iter()
                 .map(|&(from, to)| match &ground {
@@ -214,7 +212,7 @@ fn passes(
             for (offset, runs) in band.iter().enumerate() {
                 let k = first + offset;
                 for (nth, run) in runs.iter().enumerate() {
-                    let start = [run[0][0], layout.across(k, run[0][0]), run[0][1]];
+                    let start = run[0];
                     let linked = match before {
                         Some((_, from)) if nth == 0 => links.next().flatten().map(|z| (from, z)),
                         _ => None,
@@ -232,11 +230,10 @@ fn passes(
                             since_retract = 0;
                         }
                     }
-                    for &[u, z] in &run[1..] {
-                        pen.cut(layout.along.point(u, layout.across(k, u), z));
+                    for &[u, v, z] in &run[1..] {
+                        pen.cut(layout.along.point(u, v, z));
                     }
-                    let end = run[run.len() - 1];
-                    before = Some((k, [end[0], layout.across(k, end[0]), end[1]]));
+                    before = Some((k, run[run.len() - 1]));
                 }
                 since_retract += 1;
             }
@@ -250,10 +247,7 @@ fn passes(
         progress(first as f64 / passes as f64);
     }
     let mut path = pen.finish();
-    // Vertices of a slanted pass on a coarse grid stand beside its line, which turns a mirror too: heights along the
-    // line do not tell all.
-    let straight = layout.aside_mm() <= STRAIGHT * layout.pitch_mm();
-    path.tilt = (params.stock_to_leave_mm == 0.0 && straight).then_some(tilt);
+    path.tilt = (params.stock_to_leave_mm == 0.0).then_some(tilt);
     Ok(path)
 }
 
@@ -267,21 +261,15 @@ pub(super) fn backwards(pattern: Pattern, along: Axis, k: usize) -> bool {
 }
 
 /// From the end of each pass to the begin of the next one that cuts.
-fn joints(
-    layout: &Layout,
-    first: usize,
-    band: &[Vec<Run>],
-    before: Option<(usize, GridPoint)>,
-) -> Vec<(GridPoint, GridPoint)> {
-    let mut end = before.map(|(_, at)| at);
+fn joints(band: &[Vec<Run>], before: Option<GridPoint>) -> Vec<(GridPoint, GridPoint)> {
+    let mut end = before;
     let mut out = Vec::new();
-    for (offset, runs) in band.iter().enumerate() {
-        let place = |[u, z]: [i32; 2]| [u, layout.across(first + offset, u), z];
+    for runs in band {
         let (Some(head), Some(tail)) = (runs.first(), runs.last()) else { continue };
         if let Some(from) = end {
-            out.push((from, place(head[0])));
+            out.push((from, head[0]));
         }
-        end = Some(place(tail[tail.len() - 1]));
+        end = Some(tail[tail.len() - 1]);
     }
     out
 }
@@ -317,17 +305,30 @@ fn pass(
         let end = i + envelope.cl_mm[i..].iter().take_while(|z| !z.is_nan()).count();
         // A single position covers no length.
         if end - i >= 2 {
+            let leave_mm = params.stock_to_leave_mm;
+            let exact: Vec<f64> =
+                envelope.cl_mm[i..end].iter().map(|&z| site.units(f64::from(z) + leave_mm)).collect();
             let wanted: Vec<f64> =
-                envelope.bound_mm[i..end].iter().map(|&z| site.units(z + params.stock_to_leave_mm)).collect();
-            let low: Vec<f64> = wanted.iter().map(|w| w - simplify).collect();
-            let high: Vec<f64> = wanted.iter().map(|w| w + excess).collect();
-            let exact: Vec<f64> = envelope.cl_mm[i..end].iter().map(|&z| site.units(f64::from(z))).collect();
-            let vertices = match coarse {
-                true => ends::lay(&low, &high, &exact, &measure),
-                false => funnel::simplify(&low, &high, &wanted),
+                envelope.bound_mm[i..end].iter().map(|&z| site.units(z + leave_mm)).collect();
+            let (points, above) = if envelope.beside.is_empty() {
+                let low: Vec<f64> = wanted.iter().map(|w| w - simplify).collect();
+                let high: Vec<f64> = wanted.iter().map(|w| w + excess).collect();
+                let vertices = match coarse {
+                    true => ends::lay(&low, &high, &exact, &measure),
+                    false => funnel::simplify(&low, &high, &wanted),
+                };
+                let point = |&(at, z): &(usize, i32)| {
+                    let along = layout.at(i + at);
+                    [along, layout.across(k, along), z]
+                };
+                (vertices.iter().map(point).collect(), tilt::above(&exact, &vertices))
+            } else {
+                let part = Part { pass: k, first: i, exact: &exact, line: &wanted, leave_mm };
+                track::lay(site, layout, &part, &envelope.beside[i..end], &measure)
             };
-            tilt.add(&exact, &vertices, &measure, |at| layout.place_mm(k, i + at));
-            out.push(vertices.into_iter().map(|(at, z)| [layout.at(i + at), z]).collect());
+            let run = tilt::Run { exact: &exact, kept: &wanted, above: &above };
+            tilt.add(&run, &measure, |at| layout.place_mm(k, i + at));
+            out.push(points);
         }
         i = end;
     }

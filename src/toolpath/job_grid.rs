@@ -25,7 +25,7 @@ pub struct JobGrid {
     coarsest_mm: Option<f64>,
     /// Whether [`COMMON_MM`] is a whole number of every unit.
     common: bool,
-    path_tolerance_mm: f64,
+    loosest_mm: f64,
 }
 
 impl JobGrid {
@@ -37,9 +37,7 @@ impl JobGrid {
         JobGrid {
             coarsest_mm: holds_all(coarsest_mm).then_some(coarsest_mm),
             common: holds_all(COMMON_MM),
-            path_tolerance_mm: controllers
-                .iter()
-                .fold(PATH_TOLERANCE_MM, |most, controller| most.max(controller.1)),
+            loosest_mm: controllers.iter().fold(0.0, |most, controller| most.max(controller.1)),
         }
     }
 
@@ -48,7 +46,8 @@ impl JobGrid {
     pub fn site<'a>(&self, site: &Site<'a>, params: &Params) -> Site<'a> {
         let stepover_mm = params.stepover_mm.unwrap_or(STEPOVER * 2.0 * params.shape.radius_mm());
         let unit_mm = self.unit_mm([params.stepdown_mm, stepover_mm]);
-        let budget = Budget { simplify_mm: 0.0, path_tolerance_mm: self.path_tolerance_mm, ..site.budget };
+        let path_tolerance_mm = self.loosest_mm.max(PATH_TOLERANCE_MM);
+        let budget = Budget { simplify_mm: 0.0, path_tolerance_mm, ..site.budget };
         Site { unit_mm: unit_mm.unwrap_or(site.unit_mm), budget, ..*site }
     }
 
@@ -56,6 +55,11 @@ impl JobGrid {
     /// of the others.
     pub fn apart_mm(&self, unit_mm: f64) -> f64 {
         self.coarsest_mm.unwrap_or(unit_mm)
+    }
+
+    /// Most that one of the controllers may leave its path, in mm.
+    pub fn loosest_mm(&self) -> f64 {
+        self.loosest_mm
     }
 
     /// The grid in mm for such distances; None where each controller has to keep to its own.

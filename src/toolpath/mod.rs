@@ -27,6 +27,7 @@ mod slant;
 mod strip;
 mod table;
 mod tilt;
+mod track;
 
 pub use job_grid::JobGrid;
 pub use passes::{Axis, Layout};
@@ -96,6 +97,9 @@ pub struct Site<'a> {
     /// Passes lie whole numbers of it apart, in mm: a whole number of units, the same for all controllers of a job.
     pub apart_mm: f64,
     pub budget: Budget,
+    /// The tightest one among the job's controllers: by it a finish is kept off walls, so that all of them climb at the
+    /// same places.
+    pub tightest: Budget,
 }
 
 /// The retract plane, for ways on which nothing stands.

@@ -5,6 +5,12 @@ use crate::cutter::Shape;
 use crate::grid::{Heights, Window};
 use crate::surface::Surface;
 
+/// Positions this part of their distance beside a line still make a line.
+const STRAIGHT: f64 = 0.02;
+
+/// A place is on the grid if it is so near to it, in units.
+const SAME: f64 = 1e-6;
+
 /// The axis that passes run along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
@@ -118,6 +124,8 @@ pub struct Layout {
     between_ends: i64,
     /// The tile's corner along the passes, in units.
     origin: i64,
+    /// The coarsest unit among the job's controllers, in units.
+    coarse: i64,
 }
 
 impl Layout {
@@ -162,6 +170,7 @@ impl Layout {
             across: [within(across.0), within(across.1)],
             between_ends,
             origin: origin_u,
+            coarse,
         }
     }
 
@@ -181,7 +190,8 @@ impl Layout {
         let after = -(-along).div_euclid(self.between_ends) * self.between_ends;
         [before, after].into_iter().all(|along| {
             let across = f64::from(self.passes[k]) + self.slope * along as f64;
-            across >= f64::from(self.across[0]) - 1e-3 && across <= f64::from(self.across[1]) + 1e-3
+            let slack = 1e-3 * self.coarse as f64;
+            across >= f64::from(self.across[0]) - slack && across <= f64::from(self.across[1]) + slack
         })
     }
 
@@ -207,14 +217,43 @@ impl Layout {
         self.pitch_mm() * self.slope.hypot(1.0)
     }
 
+    /// The grid points next to position `i` of pass `k`: where they lie across, and how far from the line, -1 .. 0 and
+    /// 0 .. 1, in units.
+    pub(super) fn points(&self, k: usize, i: usize) -> [(i32, f64); 2] {
+        let risen = self.slope * (i64::from(self.at(i)) + self.origin) as f64;
+        // What is on the grid but for the noise of the product has its point below it.
+        let below = (risen + SAME).floor();
+        [below, below + 1.0].map(|point| (self.passes[k] + point as i32, point - risen))
+    }
+
+    /// Whether the grid meets the passes at all of their positions, but for what no move has to be bent for.
+    pub(super) fn on_grid(&self) -> bool {
+        self.aside_mm() <= STRAIGHT * self.pitch_mm()
+    }
+
     /// How far a move, whose ends are on the grid, passes the line between them, in mm.
     pub(super) fn aside_mm(&self) -> f64 {
+        self.aside_on_mm(1)
+    }
+
+    /// The same on the coarsest grid of the job.
+    pub(super) fn on_coarsest_grid(&self) -> bool {
+        self.aside_on_mm(self.coarse) <= STRAIGHT * self.pitch_mm()
+    }
+
+    /// A unit of the coarsest grid of the job in mm.
+    pub(super) fn coarsest_mm(&self) -> f64 {
+        self.coarse as f64 * self.unit_mm
+    }
+
+    /// How far grid points of so many units are from their line at most, in mm.
+    fn aside_on_mm(&self, units: i64) -> f64 {
         let off = |i: usize| {
-            let risen = self.slope * (i64::from(self.at(i)) + self.origin) as f64;
+            let risen = self.slope * (i64::from(self.at(i)) + self.origin) as f64 / units as f64;
             (risen - risen.round()).abs()
         };
         // One pass is as good as any: they lie whole units apart.
-        (0..self.count).map(off).fold(0.0, f64::max) * self.unit_mm
+        (0..self.count).map(off).fold(0.0, f64::max) * units as f64 * self.unit_mm
     }
 
     /// Between passes in mm, as the cutter meets them.

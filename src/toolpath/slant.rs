@@ -1,7 +1,8 @@
 //! Bounds of passes that run at an angle to the samples.
 //!
-//! Heights are those of a line. A slanted pass stands on the grid points next to it, half a unit from it at most, and
-//! so does a move between two of them; by that much more the cutter is allowed to stray sideways here.
+//! Heights are those of a line. Where the controller's grid is so fine that the cutter stands on it as good as
+//! everywhere, that is all; the cutter is allowed to stray sideways by the little that is missing. On a coarser grid the
+//! heights to both sides are needed too, and `track.rs` chooses between them.
 
 use std::ops::Range;
 
@@ -11,7 +12,8 @@ use super::envelope::{Cutter, Envelope, RINGS};
 use super::passes::Layout;
 use super::strip::Strip;
 use super::{Error, Site};
-use crate::compensation::{Faces, Places};
+use crate::compensation::{self, Faces, Places};
+use crate::cutter::Shape;
 
 /// Positions of a pass whose surroundings are held at once.
 const BLOCK: usize = 512;
@@ -26,6 +28,50 @@ const GROUP_RADII: f64 = 0.1;
 /// Passes that are planned together.
 const BAND: usize = 64;
 
+/// How far beside the line heights are known, in units of the grid.
+pub(super) const SIDES: [f64; 4] = [-1.0, -0.5, 0.5, 1.0];
+
+/// What is known beside one position of a line.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beside {
+    /// Exact locations at [`SIDES`] in mm.
+    pub(super) cl_mm: [f64; 4],
+    /// What these and the line's own must be raised by for what lies between positions, in mm.
+    pub(super) lift_mm: f64,
+    /// Whether on one side or the other that does not do.
+    pub(super) steep: bool,
+    /// At the grid points before and after the line of a steep place: the exact and the widened cutter's locations in mm.
+    pub(super) points_mm: [[f64; 2]; 2],
+    /// From each of these points to each of the next position's what has to be added to exact locations, in mm, if that
+    /// is known; the widened cutter's do, too.
+    pub(super) lifts_mm: [[Option<f64>; 2]; 2],
+}
+
+impl Beside {
+    const UNKNOWN: Beside = Beside {
+        cl_mm: [f64::NAN; 4],
+        lift_mm: 0.0,
+        steep: false,
+        points_mm: [[f64::NAN; 2]; 2],
+        lifts_mm: [[Some(0.0); 2]; 2],
+    };
+}
+
+/// The cutter of an operation. Moves between grid points beside a line are longer than along it; so that all controllers
+/// of a job keep to the same heights, it is one that fits the coarsest grid among them.
+pub(super) fn cutter(shape: Shape, layout: &Layout, site: &Site) -> Result<Cutter, compensation::Error> {
+    let step_mm = site.surface.lattice().step_mm;
+    let aside_mm = if layout.on_grid() { layout.aside_mm() } else { 0.0 };
+    if layout.on_coarsest_grid() {
+        return Cutter::new(shape, step_mm, layout.length_mm(), aside_mm, site.tightest);
+    }
+    // A unit more or less across than the line; and half a unit is between two of the heights beside it.
+    let unit_mm = layout.coarsest_mm();
+    let across_mm = layout.pitch_mm() * layout.slope.abs() + unit_mm;
+    let longest_mm = layout.pitch_mm().hypot(across_mm).hypot(0.5 * unit_mm);
+    Cutter::new(shape, step_mm, longest_mm, aside_mm, site.tightest)
+}
+
 /// How many passes from `first` on make a band.
 pub(super) fn band_length(layout: &Layout, first: usize) -> usize {
     BAND.min(layout.passes.len() - first)
@@ -38,14 +84,19 @@ pub(super) fn envelopes(
     layout: &Layout,
     passes: Range<usize>,
 ) -> Result<Vec<Envelope>, Error> {
-    let nothing =
-        || Envelope { bound_mm: vec![f64::NEG_INFINITY; layout.count], cl_mm: vec![f32::NAN; layout.count] };
+    let nothing = || Envelope {
+        bound_mm: vec![f64::NEG_INFINITY; layout.count],
+        cl_mm: vec![f32::NAN; layout.count],
+        beside: if layout.on_grid() { Vec::new() } else { vec![Beside::UNKNOWN; layout.count] },
+    };
+    // As the cutter: the same for all controllers.
+    let beside_mm = if layout.on_coarsest_grid() { 0.0 } else { layout.coarsest_mm() };
     let mut out: Vec<Envelope> = passes.clone().map(|_| nothing()).collect();
     let end = layout.count.saturating_sub(1);
     for from in (0..end).step_by(BLOCK) {
         let to = (from + BLOCK).min(end);
         let Some((low_mm, high_mm)) = layout.surroundings(&passes, from, to) else { continue };
-        let reach_mm = cutter.reach_mm;
+        let reach_mm = cutter.reach_mm + beside_mm;
         let strip = Strip::around(
             site.surface,
             layout.along,
@@ -57,6 +108,7 @@ pub(super) fn envelopes(
             layout,
             exact: Faces::new(&strip.facets, cutter.exact.profile()),
             wide: cutter.faces(&strip),
+            beside_mm,
             places: Places::new(&strip.heights, site.surface.lattice().step_mm),
             missed_mm: strip.missed_mm,
         };
@@ -72,6 +124,8 @@ struct Block<'a> {
     layout: &'a Layout,
     exact: Faces<'a>,
     wide: Faces<'a>,
+    /// How far to both sides heights may be needed.
+    beside_mm: f64,
     places: Places<'a>,
     missed_mm: f64,
 }
@@ -80,23 +134,23 @@ impl Block<'_> {
     /// Raises an envelope over the positions `from ..= to` of pass `k`.
     fn bound(&self, k: usize, from: usize, to: usize, envelope: &mut Envelope) {
         let mut near = None;
-        let mut beside_mm: Vec<f64> = vec![f64::NEG_INFINITY; to + 1 - from];
-        for i in from..=to {
-            if !self.layout.covers(k, i) {
-                continue;
-            }
+        for i in (from..=to).filter(|&i| self.layout.covers(k, i)) {
             let [along, across] = self.layout.turned_mm(k, i);
             let mut drop_mm = |place: [f64; 2]| {
                 let sampled = self.places.drop_mm(self.cutter.exact.profile(), place, &mut near);
                 self.exact.lift_point(place, sampled)
             };
             let z_mm = drop_mm([along, across]);
-            if z_mm.is_finite() {
-                envelope.cl_mm[i] = z_mm as f32;
-                envelope.bound_mm[i] = envelope.bound_mm[i].max(z_mm);
-                let sides = self.cutter.beside_mm().map(|aside_mm| [across - aside_mm, across + aside_mm]);
-                beside_mm[i - from] =
-                    sides.into_iter().flatten().map(|across| drop_mm([along, across])).fold(z_mm, f64::max);
+            if !z_mm.is_finite() {
+                continue;
+            }
+            envelope.cl_mm[i] = z_mm as f32;
+            envelope.bound_mm[i] = envelope.bound_mm[i].max(z_mm);
+            // The last position of a block is the first of the next one.
+            if let Some(beside) = envelope.beside.get_mut(i).filter(|beside| beside.cl_mm[0].is_nan()) {
+                let cl_mm = SIDES.map(|side| drop_mm([along, across + side * self.layout.unit_mm]));
+                // Out of reach of everything there is no bound; none is higher than the next one inwards.
+                beside.cl_mm = cl_mm.map(|cl_mm| if cl_mm.is_finite() { cl_mm } else { z_mm });
             }
         }
         let mut wide: Option<(usize, f64)> = None;
@@ -104,37 +158,77 @@ impl Block<'_> {
         for first in (from..to).step_by(group) {
             let end = (first + group).min(to);
             let middle = self.layout.turned_mm(k, first.midpoint(end));
-            let around_mm = 0.5 * (group + 1) as f64 * self.cutter.pitch_mm + self.cutter.strays_mm();
+            let around_mm =
+                0.5 * (group + 1) as f64 * self.cutter.pitch_mm + self.cutter.strays_mm() + self.beside_mm;
             let mut ceilings = [None; RINGS.len()];
+            let mut ceiling = |ring: usize| {
+                *ceilings[ring].get_or_insert_with(|| {
+                    let reach_mm = RINGS[ring] * self.cutter.radius_mm + around_mm;
+                    self.places.ceiling_mm(middle, reach_mm) + self.missed_mm
+                })
+            };
             for i in first..end {
                 let [left, right] = [i, i + 1].map(|i| f64::from(envelope.cl_mm[i]));
                 if left.is_nan() || right.is_nan() {
                     continue;
                 }
-                let contact = self.cutter.contact_mm(left.min(right), |ring| {
-                    *ceilings[ring].get_or_insert_with(|| {
-                        let reach_mm = RINGS[ring] * self.cutter.radius_mm + around_mm;
-                        self.places.ceiling_mm(middle, reach_mm) + self.missed_mm
-                    })
-                });
+                let lowest_mm = left.min(right);
+                let contact = self.cutter.contact_mm(lowest_mm, &mut ceiling);
                 let (left, right) = match contact.and_then(|t| self.cutter.lift_mm(t)) {
-                    Some(lift_mm) => (beside_mm[i - from] + lift_mm, beside_mm[i + 1 - from] + lift_mm),
+                    Some(lift_mm) => (left + lift_mm, right + lift_mm),
                     None => {
                         let before = wide.filter(|w| w.0 == i).map(|w| w.1);
-                        let a = before.unwrap_or_else(|| self.widened(k, i, &mut near));
-                        let b = self.widened(k, i + 1, &mut near);
+                        let a = before.unwrap_or_else(|| self.widened(k, i, 0.0, &mut near));
+                        let b = self.widened(k, i + 1, 0.0, &mut near);
                         wide = Some((i + 1, b));
                         self.cutter.steep_ends(a, b)
                     }
                 };
                 envelope.bound_mm[i] = envelope.bound_mm[i].max(left);
                 envelope.bound_mm[i + 1] = envelope.bound_mm[i + 1].max(right);
+                let Some([a, b]) = envelope.beside.get_mut(i..).and_then(|rest| rest.first_chunk_mut::<2>())
+                else {
+                    continue;
+                };
+                let lowest_mm = a.cl_mm.iter().chain(&b.cl_mm).fold(lowest_mm, |low, &z| low.min(z));
+                let contact = self.cutter.contact_mm(lowest_mm, &mut ceiling);
+                if let Some(lift_mm) = contact.and_then(|t| self.cutter.lift_mm(t)) {
+                    a.lift_mm = a.lift_mm.max(lift_mm);
+                    b.lift_mm = b.lift_mm.max(lift_mm);
+                    continue;
+                }
+                for (beside, i) in [(&mut *a, i), (&mut *b, i + 1)] {
+                    if !beside.steep {
+                        beside.steep = true;
+                        beside.points_mm = self.points(k, i, &mut near);
+                    }
+                }
+                a.lifts_mm = a.points_mm.map(|from| {
+                    b.points_mm.map(|to| {
+                        let contact = self.cutter.contact_mm(from[0].min(to[0]), &mut ceiling);
+                        contact.and_then(|t| self.cutter.curved_lift_mm(t, f64::INFINITY))
+                    })
+                });
             }
         }
     }
 
-    fn widened(&self, k: usize, i: usize, near: &mut Option<[usize; 2]>) -> f64 {
-        let place = self.layout.turned_mm(k, i);
+    /// Exact and widened locations at the grid points next to a position.
+    fn points(&self, k: usize, i: usize, near: &mut Option<[usize; 2]>) -> [[f64; 2]; 2] {
+        let [along, across] = self.layout.turned_mm(k, i);
+        self.layout.points(k, i).map(|(_, off)| {
+            let place = [along, across + off * self.layout.unit_mm];
+            let sampled = self.places.drop_mm(self.cutter.exact.profile(), place, near);
+            let cl_mm = self.exact.lift_point(place, sampled);
+            let wide_mm = self.widened(k, i, off, near);
+            [cl_mm, wide_mm].map(|z_mm| if z_mm.is_finite() { z_mm } else { f64::NEG_INFINITY })
+        })
+    }
+
+    /// The widened cutter's location, so many units beside the line.
+    fn widened(&self, k: usize, i: usize, off: f64, near: &mut Option<[usize; 2]>) -> f64 {
+        let [along, across] = self.layout.turned_mm(k, i);
+        let place = [along, across + off * self.layout.unit_mm];
         self.wide.lift_point(place, self.places.drop_mm(self.cutter.wide.profile(), place, near))
     }
 }

@@ -15,6 +15,8 @@ struct Positions {
     high: [f64; EIGHT],
     exact: [f64; EIGHT],
     w: [f64; EIGHT],
+    /// What is added to a point's height where moves begin at it.
+    turn: [f64; EIGHT],
     /// Sums up to and with each position, of w, w g and w g^2 for the slope g that leads to it.
     sums: [[f64; EIGHT]; 3],
 }
@@ -26,6 +28,18 @@ struct Points {
     cost: [f64; EIGHT],
     /// Position and layer that the way comes from: position times the layers, and the layer.
     from: [u32; EIGHT],
+}
+
+/// What moves have to keep to, in units.
+pub(super) struct Bounds<'a> {
+    /// Between which a move may pass a position; nothing between them where every move ends.
+    pub(super) low: &'a [f64],
+    pub(super) high: &'a [f64],
+    /// Between which a move may end, if a whole unit lies there; the lowest one above them otherwise.
+    pub(super) ends: &'a [[f64; 2]],
+    /// How much higher than whole units moves end, and how much is added where the next one begins: heights of a pass
+    /// beside its line are counted from a slope across it. Nothing for a straight one.
+    pub(super) off: &'a [[f64; 2]],
 }
 
 /// Grid points between the bounds of positions in a row, in groups of eight; the last group may run past the end.
@@ -43,7 +57,8 @@ pub(super) struct Table {
 
 impl Table {
     /// Bounds and exact heights in units; none of them empty.
-    pub(super) fn new(low: &[f64], high: &[f64], exact: &[f64], measure: &Measure) -> Table {
+    pub(super) fn new(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Table {
+        let Bounds { low, high, ends, off } = bounds;
         let count = low.len();
         let groups = count.div_ceil(EIGHT);
         let weights = weights(exact, measure);
@@ -53,6 +68,7 @@ impl Table {
             high: [f64::NEG_INFINITY; EIGHT],
             exact: [0.0; EIGHT],
             w: [0.0; EIGHT],
+            turn: [0.0; EIGHT],
             sums: [[0.0; EIGHT]; 3],
         };
         let mut table = Table {
@@ -77,14 +93,15 @@ impl Table {
                 sum[k] += term;
                 to.sums[k][lane] = sum[k];
             }
-            let first = low[i].ceil();
-            let states = (high[i].floor() - first).max(0.0) as usize + 1;
+            to.turn[lane] = off[i][1];
+            let first = (ends[i][0] - off[i][0]).ceil();
+            let states = ((ends[i][1] - off[i][0]).floor() - first).max(0.0) as usize + 1;
             while table.layers.len() < states {
                 let none = Points { z: [0.0; EIGHT], cost: [ABSENT; EIGHT], from: [0; EIGHT] };
                 table.layers.push(vec![none; groups]);
             }
             for (nth, layer) in table.layers[..states].iter_mut().enumerate() {
-                layer[group].z[lane] = first + nth as f64;
+                layer[group].z[lane] = first + nth as f64 + off[i][0];
                 layer[group].cost[lane] = if i == 0 { 0.0 } else { f64::INFINITY };
             }
         }
@@ -137,7 +154,7 @@ impl Table {
         let from = (i * self.layers.len() + nth) as u32;
         let (group, lane) = (i / EIGHT, i % EIGHT);
         let origin = &self.layers[nth][group];
-        let z = E::splat(origin.z[lane]);
+        let z = E::splat(origin.z[lane] + self.positions[group].turn[lane]);
         // No move from here costs less than this.
         let at_least = E::splat(origin.cost[lane] + self.block);
         let [sum_w, sum_wg, sum_wg2] = self.positions[group].sums;
@@ -202,8 +219,8 @@ impl Table {
         }
     }
 
-    /// The way to the cheapest point of the last position.
-    pub(super) fn best(&self) -> Vec<Vertex> {
+    /// The way to the cheapest point of the last position: whole units, `off` taken away again.
+    pub(super) fn best(&self, off: &[[f64; 2]]) -> Vec<Vertex> {
         let layers = self.layers.len();
         let last = self.count - 1;
         let at = |nth: usize, i: usize| (&self.layers[nth][i / EIGHT], i % EIGHT);
@@ -217,7 +234,7 @@ impl Table {
         let (mut i, mut nth) = (last, best);
         loop {
             let (points, lane) = at(nth, i);
-            out.push((i, points.z[lane] as i32));
+            out.push((i, (points.z[lane] - off[i][0]).round() as i32));
             if i == 0 {
                 break;
             }
@@ -280,14 +297,17 @@ mod tests {
             let exact: Vec<f64> = facets.scan(0.4, |z, slope| { *z += slope; Some(*z) }).collect();
             let low: Vec<f64> = exact.iter().map(|z| z - 0.1).collect();
             let high: Vec<f64> = exact.iter().map(|z| z + 0.95).collect();
-            let mut widest = Table::new(&low, &high, &exact, &MEASURE);
+            let ends: Vec<[f64; 2]> = low.iter().zip(&high).map(|(low, high)| [*low, *high]).collect();
+            let off = vec![[0.0; 2]; low.len()];
+            let bounds = Bounds { low: &low, high: &high, ends: &ends, off: &off };
+            let mut widest = Table::new(&bounds, &exact, &MEASURE);
             widest.fill();
-            let mut portable = Table::new(&low, &high, &exact, &MEASURE);
+            let mut portable = Table::new(&bounds, &exact, &MEASURE);
             portable.fill_with::<Portable>();
             for (a, b) in widest.layers.iter().flatten().zip(portable.layers.iter().flatten()) {
                 prop_assert!(a.cost.iter().zip(&b.cost).all(|(a, b)| a.to_bits() == b.to_bits()));
             }
-            prop_assert_eq!(widest.best(), portable.best());
+            prop_assert_eq!(widest.best(&off), portable.best(&off));
         }
     }
 }

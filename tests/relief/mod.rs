@@ -66,6 +66,8 @@ impl Surface for Relief {
 
 /// A blank around the relief: the stock's top at 0.2 mm, the program's zero on it.
 pub fn site<'a>(relief: &'a Relief, unit_mm: f64, path_tolerance_mm: f64) -> Site<'a> {
+    let depth_mm = relief.top_mm - relief.bottom_mm;
+    let budget = Budget::split(0.002, path_tolerance_mm, relief.steepest, depth_mm).unwrap();
     Site {
         surface: relief,
         origin_mm: [0.0, 0.0],
@@ -77,8 +79,8 @@ pub fn site<'a>(relief: &'a Relief, unit_mm: f64, path_tolerance_mm: f64) -> Sit
         retract: None,
         unit_mm,
         apart_mm: unit_mm,
-        budget: Budget::split(0.002, path_tolerance_mm, relief.steepest, relief.top_mm - relief.bottom_mm)
-            .unwrap(),
+        budget,
+        tightest: budget,
     }
 }
 
