@@ -34,7 +34,7 @@ pub(super) const BLOCK_WORK: usize = 60;
 pub(super) const ROW_WORK: usize = 90;
 
 /// Part of the work of taking every sample that the first rows may take more than their share.
-const ALLOWANCE: f64 = 0.01;
+const ALLOWANCE: f64 = 0.05;
 
 /// Samples of a block that share offsets, at least, for these to be looked for.
 pub(super) const MANY: u32 = 12;

@@ -104,12 +104,14 @@ fn few_rows(h: &Heights, tables: &Tables, targets: &[RowTarget]) -> Vec<Vec<f32>
     let mut stencils = Vec::new();
     let mut rows = Vec::with_capacity(targets.len());
     let (mut left, mut right) = (i64::MAX, i64::MIN);
+    // Rows that start further right than others end in the field too.
+    let columns = targets.iter().map(|t| t.count).max().unwrap_or(0);
     let mut at = Vec::with_capacity(targets.len());
     for target in targets {
         let (column, x) = split(target.x0_mm, step_mm);
         let (row, y) = split(target.y_mm, step_mm);
         left = left.min(column);
-        right = right.max(column + target.count as i64);
+        right = right.max(column + columns as i64);
         at.push((column, row, x, y));
     }
     let halo = reach + 2;
@@ -125,9 +127,6 @@ fn few_rows(h: &Heights, tables: &Tables, targets: &[RowTarget]) -> Vec<Vec<f32>
         columns: (right - left + 2 * halo) as usize,
         rows: (last.row - first.row + 1 + 2 * halo) as usize,
     };
-    let columns = targets.iter().map(|t| t.count).max().unwrap_or(0);
-    // A row that starts further right than others ends in the field too, or in its padding.
-    let input = Window { columns: input.columns + columns, ..input };
     let pairs = OverSamples {
         stencils: &stencils,
         rows: &rows,
