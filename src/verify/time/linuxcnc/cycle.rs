@@ -1,6 +1,6 @@
 use super::blend::parabola_begins;
 use super::segment::{End, Ending, Segment};
-use super::{Controller, Limits, SAME_PLACE};
+use super::{Controller, Limits, SAME_PLACE, greater, lesser};
 
 /// 1 / ARC_BLEND_RAMP_FREQ as delivered: shorter segments change their speed evenly.
 const RAMP_TIME: f64 = 0.01;
@@ -8,6 +8,8 @@ const NO_SPEED: f64 = 1e-8;
 const NO_TIME: f64 = 1e-12;
 /// Braking is even within this part of its square.
 const EVEN: f64 = 1e-12;
+/// Cycles that are left to be taken one by one: in the last of them the end comes into sight, and rounding has its say.
+const LAST: f64 = 1.0 + 1e-6;
 /// What is this part of a limit is below it, however it was rounded.
 const CLEAR: f64 = 1.0 - 1e-9;
 
@@ -26,7 +28,9 @@ impl Controller {
             head.period = limits.period;
             let bounds = Bounds::of(head, next.as_deref(), &limits);
             cycles += cruise(head, &bounds, &limits, most - 1);
-            if !head.ramp {
+            if head.ramp {
+                cycles += change_evenly(head, &bounds, &limits, most - cycles);
+            } else {
                 cycles += speed_up(head, &bounds, &limits, most - cycles);
                 cycles += slow_down(head, next.as_deref_mut(), &bounds, &limits, most - cycles);
             }
@@ -59,7 +63,7 @@ fn activate(head: &mut Segment, limits: &Limits) {
 }
 
 fn target(segment: &Segment, limits: &Limits) -> f64 {
-    segment.speed_asked().min(limits.path_speed)
+    lesser(segment.speed_asked(), limits.path_speed)
 }
 
 /// What holds of a segment while it runs and nothing more comes in.
@@ -77,7 +81,7 @@ impl Bounds {
         let asked = target(segment, limits);
         let end = match next {
             Some(next) if segment.end == End::Tangent => {
-                segment.end_speed.min(asked).min(target(next, limits))
+                lesser(lesser(segment.end_speed, asked), target(next, limits))
             }
             _ => 0.0,
         };
@@ -161,7 +165,7 @@ fn slow_down(
         let Some(next) = &next else { return 0 };
         lowest = lowest.max(parabola_begins(head, next, asked, target(next, limits)));
     }
-    let cycles = (head.speed - lowest) / gain - 2.0;
+    let cycles = (head.speed - lowest) / gain - LAST;
     if !(1.0..1e9).contains(&cycles) {
         return 0;
     }
@@ -176,9 +180,29 @@ fn slow_down(
     cycles
 }
 
+/// Runs whole cycles of a short segment that goes from its speed to the one at its end with one acceleration.
+fn change_evenly(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> u64 {
+    let &Bounds { end, along, .. } = bounds;
+    if most == 0 || head.end != End::Tangent || end < NO_SPEED {
+        return 0;
+    }
+    let time = 2.0 * head.left() / (head.speed + end);
+    let gain = (end - head.speed) / time * limits.period;
+    let cycles = time / limits.period - LAST;
+    if !(1.0..1e9).contains(&cycles) || gain.abs() > along * limits.period * CLEAR {
+        return 0;
+    }
+    let cycles = (cycles as u64).min(most);
+    let speed = head.speed + cycles as f64 * gain;
+    head.progress += 0.5 * (head.speed + speed) * cycles as f64 * limits.period;
+    head.speed = speed;
+    head.braking = false;
+    cycles
+}
+
 /// Whether a cycle of no more than full acceleration cannot come to the end.
 fn far_from_end(left: f64, speed: f64, end: f64, gain: f64, limits: &Limits) -> bool {
-    left * CLEAR > (speed.max(end) + gain) * limits.period
+    left * CLEAR > (greater(speed, end) + gain) * limits.period
 }
 
 /// One step of a segment over its period.
@@ -191,7 +215,7 @@ fn step(segment: &mut Segment, bounds: &Bounds, limits: &Limits) {
     let (acceleration, desired) = if segment.ramp && segment.end == End::Tangent && end >= NO_SPEED {
         let mean = 0.5 * (segment.speed + end);
         let time = if mean > NO_SPEED { (left / mean).max(1e-16) } else { 1e-16 };
-        (((end - segment.speed) / time).clamp(-along, along), end)
+        (within((end - segment.speed) / time, along), end)
     } else {
         trapezoid(segment, bounds, left)
     };
@@ -203,7 +227,7 @@ fn step(segment: &mut Segment, bounds: &Bounds, limits: &Limits) {
         segment.speed = 0.0;
     } else {
         let way = 0.5 * (speed + segment.speed) * segment.period;
-        segment.progress = (segment.progress + way).min(segment.length);
+        segment.progress = lesser(segment.progress + way, segment.length);
         segment.speed = speed;
     }
     segment.braking = (desired - segment.speed).abs() < NO_SPEED && acceleration < 0.0;
@@ -221,7 +245,7 @@ fn even(segment: &Segment, bounds: &Bounds, left: f64) -> bool {
 /// What [`step`] comes to at an even speed.
 fn coast(segment: &mut Segment, limits: &Limits) {
     let speed = segment.speed;
-    segment.progress = (segment.progress + speed * segment.period).min(segment.length);
+    segment.progress = lesser(segment.progress + speed * segment.period, segment.length);
     segment.braking = false;
     segment.period = limits.period;
     let left = segment.left();
@@ -239,9 +263,9 @@ fn trapezoid(segment: &Segment, bounds: &Bounds, left: f64) -> (f64, f64) {
     let half = 0.5 * along * segment.period;
     let root = end * end + along * (2.0 * left - segment.speed * segment.period) + half * half;
     let most = if root > half * half { root.sqrt() - half } else { -half };
-    let speed = most.clamp(-asked, asked);
-    let period = segment.period.max(NO_TIME);
-    (((speed - segment.speed) / period).clamp(-along, along), most)
+    let speed = within(most, asked);
+    let period = greater(segment.period, NO_TIME);
+    (within((speed - segment.speed) / period, along), most)
 }
 
 /// Whether the segment ends before the next cycle does, and when (tp.c: tpCheckEndCondition).
@@ -308,4 +332,9 @@ fn parabola(head: &mut Segment, next: &mut Segment, limits: &Limits) {
     if head.handing_over {
         step(next, &Bounds::of(next, None, limits), limits);
     }
+}
+
+/// The number between -most and most that is nearest.
+fn within(number: f64, most: f64) -> f64 {
+    lesser(greater(number, -most), most)
 }

@@ -19,6 +19,16 @@ use segment::{End, Segment};
 /// Shorter is no way at all (TP_POS_EPSILON).
 const SAME_PLACE: f64 = 1e-12;
 
+/// The lesser of two numbers; [`f64::min`] minds what is no number too, which a step of the servo loop has no time for.
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers.
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// What of a machine the controller knows, in mm and s.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {

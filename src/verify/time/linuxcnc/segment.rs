@@ -1,5 +1,7 @@
 use glam::DVec3;
 
+use super::{greater, lesser};
+
 /// What the tangential part of the acceleration keeps beside a blend's normal part.
 pub(super) const TANGENTIAL: f64 = 0.5;
 
@@ -97,7 +99,7 @@ pub(super) struct Ending {
 
 impl Segment {
     pub fn acceleration_whole(&self) -> f64 {
-        let kinks = 1.0 - self.kink_after.max(self.kink_before);
+        let kinks = 1.0 - greater(self.kink_after, self.kink_before);
         let halved = self.parabola_before || self.end == End::Parabola;
         self.acceleration * if halved { 0.5 * kinks } else { kinks }
     }
@@ -109,7 +111,7 @@ impl Segment {
     }
 
     pub fn speed_asked(&self) -> f64 {
-        self.requested.min(self.speed_max)
+        lesser(self.requested, self.speed_max)
     }
 
     /// Fixes its length: a step of the servo loop at most covers it, and an arc is as fast as its
