@@ -40,7 +40,7 @@ pub(super) struct Cutter {
     pub(super) exact: Tables,
     pub(super) wide: Tables,
     pub(super) radius_mm: f64,
-    tip_mm: f64,
+    pub(super) tip_mm: f64,
     /// Farthest contact from the tip's centre that is still on the round part.
     round_mm: f64,
     /// Between positions, along the pass.
@@ -184,11 +184,6 @@ impl Cutter {
         let lowest = known.fold(f32::INFINITY, |low, &z| if z < low { z } else { low });
         let contact = self.contact_mm(f64::from(lowest), |ring| ceilings[ring].highest(first_mm, last_mm));
         contact.and_then(|t| self.lift_mm(t)) == Some(0.0)
-    }
-
-    /// How far to both sides of a line its heights have to be known, in mm; None where a slope says enough.
-    pub(super) fn beside_mm(&self) -> Option<f64> {
-        (self.aside_mm > self.budget.raster_mm).then_some(self.aside_mm)
     }
 
     /// How far from its line the cutter may be, sideways and by the controller.
@@ -359,12 +354,8 @@ impl Cutter {
         // From one position to the next it may be farther than along the line.
         let pitch_mm = self.pitch_mm + self.aside_mm;
         let centre = (tip * tip - strayed * strayed).sqrt();
-        let sideways_mm = match self.beside_mm() {
-            // Between the higher of both sides and what lies between them.
-            Some(aside_mm) => tip * tip * aside_mm * aside_mm / (2.0 * centre * centre * centre),
-            // Sideways a concave height rises by no more than its slope.
-            None => self.aside_mm * strayed / centre,
-        };
+        // Sideways a concave height rises by no more than its slope.
+        let sideways_mm = self.aside_mm * strayed / centre;
         let bulge_mm = tip * tip * pitch_mm * pitch_mm / (8.0 * above * above * above);
         // The steep way takes no less sideways.
         if bulge_mm > most_mm {

@@ -17,6 +17,10 @@ use super::{
 use crate::cutter::Shape;
 use crate::tolerance::EXCESS_MM;
 
+/// A length is no longer than another if it is so by less than this, in mm: one controller counts in other units than the
+/// next.
+const SAME_MM: f64 = 1e-6;
+
 /// How far apart passes lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Spacing {
@@ -193,18 +197,18 @@ fn passes(
                 .collect();
             planned.iter().for_each(|(_, turned)| tilt.merge(turned));
             let band: Vec<Vec<Run>> = planned.into_iter().map(|(runs, _)| runs).collect();
-            let joints = joints(&band, before.map(|(_, at)| at));
+            let joints = joints(&layout, first, &band, before);
             let links: Vec<Option<i32>> = joints
                 .par_iter()
-                .map(|&(from, to)| match &ground {
-                    _ if params.pattern == Pattern::OneWay => Ok(None),
+                .map(|&(from, to, apart_mm)| match &ground {
+                    _ if params.pattern == Pattern::OneWay || apart_mm > longest_mm + SAME_MM => Ok(None),
                     Some(ground) => {
                         let leave_mm = params.stock_to_leave_mm;
-                        Ok(link::level(site, &cutter, ground, from, to, leave_mm, longest_mm))
+                        Ok(link::level(site, &cutter, ground, from, to, leave_mm))
                     }
                     None => {
                         let leave_mm = params.stock_to_leave_mm;
-                        link::elsewhere(site, &cutter, layout.along, from, to, leave_mm, longest_mm)
+                        link::elsewhere(site, &cutter, layout.along, from, to, leave_mm)
                     }
                 })
                 .collect::<Result<_, Error>>()?;
@@ -247,7 +251,9 @@ fn passes(
         progress(first as f64 / passes as f64);
     }
     let mut path = pen.finish();
-    path.tilt = (params.stock_to_leave_mm == 0.0).then_some(tilt);
+    // Beside a line that the grid does not meet heights are known where its passes are laid there.
+    let known = layout.on_grid() || slant::tracks(&params.shape, &layout);
+    path.tilt = (params.stock_to_leave_mm == 0.0 && known).then_some(tilt);
     Ok(path)
 }
 
@@ -260,16 +266,24 @@ pub(super) fn backwards(pattern: Pattern, along: Axis, k: usize) -> bool {
     }
 }
 
-/// From the end of each pass to the begin of the next one that cuts.
-fn joints(band: &[Vec<Run>], before: Option<GridPoint>) -> Vec<(GridPoint, GridPoint)> {
+/// From the end of each pass to the begin of the next one that cuts, and how far apart their lines are there in mm: the
+/// same for all controllers, wherever on their grids they stand.
+fn joints(
+    layout: &Layout,
+    first: usize,
+    band: &[Vec<Run>],
+    before: Option<(usize, GridPoint)>,
+) -> Vec<(GridPoint, GridPoint, f64)> {
     let mut end = before;
     let mut out = Vec::new();
-    for runs in band {
+    for (offset, runs) in band.iter().enumerate() {
         let (Some(head), Some(tail)) = (runs.first(), runs.last()) else { continue };
-        if let Some(from) = end {
-            out.push((from, head[0]));
+        let k = first + offset;
+        if let Some((before, from)) = end {
+            let [a, b] = [(before, from), (k, head[0])].map(|(k, at)| layout.line_mm(k, at[0]));
+            out.push((from, head[0], (b[0] - a[0]).hypot(b[1] - a[1])));
         }
-        end = Some(tail[tail.len() - 1]);
+        end = Some((k, tail[tail.len() - 1]));
     }
     out
 }

@@ -9,7 +9,7 @@ use super::{Axis, Error, GridPoint, Site};
 pub(super) const LONGEST_STEPOVERS: f64 = 4.0;
 
 /// Height in units of a level link from one place to another (along, across, units), or None where
-/// the way is too long, too high to be worth it, or leads past what is known.
+/// the way is too high to be worth it, or leads past what is known.
 pub(super) fn level(
     site: &Site,
     cutter: &Cutter,
@@ -17,14 +17,9 @@ pub(super) fn level(
     from: GridPoint,
     to: GridPoint,
     leave_mm: f64,
-    longest_mm: f64,
 ) -> Option<i32> {
     let place = |p: GridPoint| [f64::from(p[0]) * site.unit_mm, f64::from(p[1]) * site.unit_mm];
-    let (a, b) = (place(from), place(to));
-    if (b[0] - a[0]).hypot(b[1] - a[1]) > longest_mm {
-        return None;
-    }
-    let lowest_mm = ground.straight(cutter, a, b)? + leave_mm;
+    let lowest_mm = ground.straight(cutter, place(from), place(to))? + leave_mm;
     let z = site.unit_above(lowest_mm).max(from[2]).max(to[2]);
     (z <= site.unit_above(site.top_allowance_mm)).then_some(z)
 }
@@ -37,16 +32,12 @@ pub(super) fn elsewhere(
     from: GridPoint,
     to: GridPoint,
     leave_mm: f64,
-    longest_mm: f64,
 ) -> Result<Option<i32>, Error> {
     let end = |pick: fn(i32, i32) -> i32, axis: usize| f64::from(pick(from[axis], to[axis])) * site.unit_mm;
     let low_mm = [0, 1].map(|axis| end(Ord::min, axis));
     let high_mm = [0, 1].map(|axis| end(Ord::max, axis));
-    if (high_mm[0] - low_mm[0]).hypot(high_mm[1] - low_mm[1]) > longest_mm {
-        return Ok(None);
-    }
     let reach_mm = cutter.reach_mm;
     let strip =
         Strip::around(site.surface, along, low_mm.map(|mm| mm - reach_mm), high_mm.map(|mm| mm + reach_mm))?;
-    Ok(level(site, cutter, &Ground::new(&strip, cutter), from, to, leave_mm, longest_mm))
+    Ok(level(site, cutter, &Ground::new(&strip, cutter), from, to, leave_mm))
 }

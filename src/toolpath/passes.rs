@@ -264,7 +264,11 @@ impl Layout {
 
     /// Position `i` on the line of pass `k`, along and across in mm.
     pub(super) fn turned_mm(&self, k: usize, i: usize) -> [f64; 2] {
-        let along = self.at(i);
+        self.line_mm(k, self.at(i))
+    }
+
+    /// The line of pass `k` at a place along it in units, along and across in mm.
+    pub(super) fn line_mm(&self, k: usize, along: i32) -> [f64; 2] {
         let risen = self.slope * (i64::from(along) + self.origin) as f64;
         [f64::from(along), f64::from(self.passes[k]) + risen].map(|units| units * self.unit_mm)
     }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::envelope::{Cutter, Envelope, RINGS};
-use super::passes::Layout;
+use super::passes::{Layout, tip_radius_mm};
 use super::strip::Strip;
 use super::{Error, Site};
 use crate::compensation::{self, Faces, Places};
@@ -57,12 +57,19 @@ impl Beside {
     };
 }
 
+/// Whether the passes of a cutter are laid between grid points beside their lines. Without a round tip only a widened
+/// cutter tells what lies between two positions, so each would be a vertex: it is widened by half a unit more instead.
+pub(super) fn tracks(shape: &Shape, layout: &Layout) -> bool {
+    tip_radius_mm(shape) > 0.0 && !layout.on_grid()
+}
+
 /// The cutter of an operation. Moves between grid points beside a line are longer than along it; so that all controllers
 /// of a job keep to the same heights, it is one that fits the coarsest grid among them.
 pub(super) fn cutter(shape: Shape, layout: &Layout, site: &Site) -> Result<Cutter, compensation::Error> {
     let step_mm = site.surface.lattice().step_mm;
-    let aside_mm = if layout.on_grid() { layout.aside_mm() } else { 0.0 };
-    if layout.on_coarsest_grid() {
+    let track = tracks(&shape, layout);
+    let aside_mm = if track { 0.0 } else { layout.aside_mm() };
+    if layout.on_coarsest_grid() || tip_radius_mm(&shape) == 0.0 {
         return Cutter::new(shape, step_mm, layout.length_mm(), aside_mm, site.tightest);
     }
     // A unit more or less across than the line; and half a unit is between two of the heights beside it.
@@ -84,13 +91,15 @@ pub(super) fn envelopes(
     layout: &Layout,
     passes: Range<usize>,
 ) -> Result<Vec<Envelope>, Error> {
+    let track = cutter.tip_mm > 0.0 && !layout.on_grid();
     let nothing = || Envelope {
         bound_mm: vec![f64::NEG_INFINITY; layout.count],
         cl_mm: vec![f32::NAN; layout.count],
-        beside: if layout.on_grid() { Vec::new() } else { vec![Beside::UNKNOWN; layout.count] },
+        beside: if track { vec![Beside::UNKNOWN; layout.count] } else { Vec::new() },
     };
     // As the cutter: the same for all controllers.
-    let beside_mm = if layout.on_coarsest_grid() { 0.0 } else { layout.coarsest_mm() };
+    let aside = cutter.tip_mm > 0.0 && !layout.on_coarsest_grid();
+    let beside_mm = if aside { layout.coarsest_mm() } else { 0.0 };
     let mut out: Vec<Envelope> = passes.clone().map(|_| nothing()).collect();
     let end = layout.count.saturating_sub(1);
     for from in (0..end).step_by(BLOCK) {
