@@ -6,6 +6,9 @@ use job::{Bench, figure, programs};
 use predicates::prelude::*;
 use predicates::str::contains;
 use screenmill::grid::{Heights, Window};
+use screenmill::job::Job;
+use screenmill::pipeline::{self, Look};
+use screenmill::progress::Silent;
 use screenmill::surface::HeightWriter;
 use serde_json::Value;
 
@@ -424,4 +427,54 @@ fn roughing_that_finds_nothing_to_cut_is_left_out_of_a_tile_and_said() {
         said.expect("a note")["message"],
         "operation 1 (rough, flat-3) has nothing to cut: no metal stands over its stock_to_leave_mm where it can get"
     );
+}
+
+/// A large part is looked at in places under each cutter, and all over under the set that will do.
+#[test]
+fn a_large_part_is_checked_by_some_of_it_and_its_set_by_all() {
+    let bench = Bench::with(&[
+        (
+            "screen = \"screen.toml\"\ncells = [324, 149, 325, 150]",
+            "heights = \"waves.npy\"\npixel_mm = 0.02",
+        ),
+        ("[machine]", "[tools]\nlibrary = \"./two.toml\"\n[machine]"),
+    ]);
+    let tools =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/samples/tools.toml")).expect("tools");
+    let mut tables = tools.split("[[tool]]");
+    let head = tables.next().expect("a head");
+    let wanted = ["\"flat-3\"", "\"ball-1\"", "\"ball-2\""];
+    let some: Vec<&str> = tables.filter(|table| wanted.iter().any(|name| table.contains(name))).collect();
+    assert_eq!(some.len(), wanted.len());
+    bench.write("two.toml", format!("{head}[[tool]]{}", some.join("[[tool]]")));
+    // Creases, closer together from left to right.
+    let (columns, rows) = (4200, 2100);
+    let mut waves = HeightWriter::create(&bench.path("waves.npy"), columns, rows, 0.02, [0.0; 2]).unwrap();
+    let line: Vec<f32> = (0..columns)
+        .map(|k| {
+            let x = 0.02 * k as f64;
+            (0.25 * (0.5 * x + 0.002 * x * x).sin().abs() - 0.25) as f32
+        })
+        .collect();
+    for row in 0..rows as i64 {
+        let window = Window { column: 0, row, columns, rows: 1 };
+        waves.write(&Heights { window, z_mm: line.clone() }).unwrap();
+    }
+    waves.finish().unwrap();
+    let job = Job::read(&bench.path("job.toml")).unwrap();
+    let check = |look| pipeline::check(&job, &bench.path(""), None, look, &Silent).unwrap();
+    let (all, some) = (check(Look::Share(1.0)), check(Look::Most(3_000_000)));
+    assert_eq!(all.looked_at_fraction, None);
+    let looked_at = some.looked_at_fraction.expect("a part of it");
+    assert!((0.2..0.5).contains(&looked_at), "{looked_at}");
+    for (all, some) in all.cutters.iter().zip(&some.cutters) {
+        let error = some.standard_error.expect("an error").unreachable_fraction;
+        let off = (all.unreachable_fraction - some.unreachable_fraction).abs();
+        assert!(off <= 4.0 * error, "{:?}: {off} off, {error} said", all.tools);
+    }
+    let [all, exact] = [&all, &some].map(|checked| checked.smallest_set.as_ref().expect("a set"));
+    assert!(exact.standard_error.is_none() && all.unreachable_fraction > 0.0);
+    assert_eq!((&all.tools, all.unreachable_fraction), (&exact.tools, exact.unreachable_fraction));
+    let shared = check(Look::Share(looked_at)).smallest_set.expect("a set");
+    assert!(shared.standard_error.is_some());
 }

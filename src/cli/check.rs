@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use screenmill::job::Job;
-use screenmill::pipeline::{self, Reach};
+use screenmill::pipeline::{self, Look, Reach};
 use screenmill::report::{Severity, Verdict, write_json};
 
 use super::console::Console;
@@ -35,8 +35,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let folder = arguments.job.parent().unwrap_or(Path::new(""));
     let console = Console::new(common.quiet, common.verbose);
     let staging = arguments.out.as_deref().map(Staging::beside).transpose()?;
-    let checked =
-        pipeline::check(&job, folder, staging.as_ref().map(Staging::path), arguments.share, &console)?;
+    let look = arguments.share.map_or_else(Look::default, Look::Share);
+    let checked = pipeline::check(&job, folder, staging.as_ref().map(Staging::path), look, &console)?;
     console.times();
     if let Some(staging) = staging {
         write_json(&staging.path().join("check.json"), &checked)?;

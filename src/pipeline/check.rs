@@ -29,9 +29,22 @@ const TRIED_SETS: usize = 4;
 /// Standard errors from a limit within which a share of the area does not tell.
 const NEAR: f64 = 3.0;
 
-/// Samples up to which all of a part is looked at under each cutter. Of a larger one so many: its figures are then off
-/// by less than a tenth of a per cent of the area or so, and a library takes a minute.
-const WHOLE: f64 = 64e6;
+/// How much of a part is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Look {
+    /// This part of the area, up to 1 for all of it.
+    Share(f64),
+    /// Under each cutter so many samples at most, and all of the part under the set that they come to.
+    Most(u64),
+}
+
+impl Default for Look {
+    /// Figures of so many samples of a screen are off by about a tenth of a per cent of the area, and a library takes
+    /// less than a minute.
+    fn default() -> Look {
+        Look::Most(64_000_000)
+    }
+}
 
 /// What one cutter, or a set, leaves of a part at best.
 #[derive(Clone, Debug, Serialize)]
@@ -95,14 +108,13 @@ struct Designed {
     view: Option<View>,
 }
 
-/// Checks a job, by a `share` of the area up to 1 for all of it. None: by all of it, or, of a part over 64 Msamples, by
-/// a share under the cutters one by one and by all of it under the set that they come to. With `out`, the cavities of
-/// the set (or of all cutters, if none will do) are written as maps there, all of them whatever the share.
+/// Checks a job. With `out`, the cavities of the set (or of all cutters, if none will do) are written as maps there,
+/// all of them however little was looked at.
 pub fn check(
     job: &Job,
     folder: &Path,
     out: Option<&Path>,
-    share: Option<f64>,
+    look: Look,
     progress: &dyn Progress,
 ) -> Result<Checked, Error> {
     let shop = Shop::open(job, folder)?;
@@ -112,10 +124,12 @@ pub fn check(
     let candidates = candidates(job, &shop, &tiles)?;
     let usable: Vec<usize> = (0..candidates.len()).filter(|&i| candidates[i].refused.is_none()).collect();
     let whole = Facts { job, part: &part, tiles: &tiles, candidates: &candidates, share: 1.0 };
-    let most = (WHOLE / whole.samples() as f64).min(1.0);
-    let job_facts = Facts { share: share.unwrap_or(most), ..whole };
-    // A set that a share of the area found is measured on all of it, unless only the share was asked for.
-    let of_sets = if share.is_some() { &job_facts } else { &whole };
+    // A set that some of the area found is measured on all of it, unless only a share was asked for.
+    let (share, of_sets, near) = match look {
+        Look::Share(share) => (share, Facts { share, ..whole }, 0.0),
+        Look::Most(samples) => ((samples as f64 / whole.samples() as f64).min(1.0), whole, NEAR),
+    };
+    let job_facts = Facts { share, ..whole };
     let singles: Vec<Vec<usize>> = (0..candidates.len()).map(|i| vec![i]).collect();
     progress.begin("cutters one by one", job_facts.looked_at());
     let looked = job_facts.measure(&singles, progress)?;
@@ -124,7 +138,6 @@ pub fn check(
     for (index, measured) in looked.sets.iter().enumerate() {
         cutters.push(job_facts.reach(&[index], measured, &designed));
     }
-    let near = if share.is_some() { 0.0 } else { NEAR };
     let mut smallest_set = None;
     let mut best: Vec<usize> = usable.clone();
     for set in sets(&usable, &looked.masks, job_facts.share, near).into_iter().take(TRIED_SETS) {
@@ -255,6 +268,7 @@ fn sets(usable: &[usize], masks: &[Vec<u64>], share: f64, near: f64) -> Vec<Vec<
 }
 
 /// The part and the cutters that are tried on it.
+#[derive(Clone, Copy)]
 pub(super) struct Facts<'a> {
     pub job: &'a Job,
     pub part: &'a Part,

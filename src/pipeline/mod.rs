@@ -32,7 +32,7 @@ mod shop;
 mod tabs;
 mod underside;
 
-pub use check::{Checked, Reach, StandardError, check};
+pub use check::{Checked, Look, Reach, StandardError, check};
 pub use cut::{Milled, mill};
 pub use error::Error;
 pub use estimate::{Estimated, estimate};
