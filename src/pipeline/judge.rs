@@ -291,7 +291,11 @@ impl Case<'_> {
         for (post, programs) in self.posts.iter().enumerate() {
             let stock = self.blank.heights(self.swept_window(window, halo as i64), lattice.step_mm, 0.0);
             let swept = verify::sweep(stock, lattice.step_mm, 0.0, programs);
-            let machined = swept.heights.crop(window.grown(halo));
+            let wanted = window.grown(halo);
+            let mut machined = match swept.heights.window == wanted {
+                true => swept.heights,
+                false => swept.heights.crop(wanted),
+            };
             let mut tally = Tally::new(self.tally);
             let own_machined = own(&machined);
             let layers = Layers {
@@ -304,19 +308,19 @@ impl Case<'_> {
             tally.add_with(window, layers, normals)?;
             block.tallies.push(tally);
             block.cuts.push(swept.programs);
+            mask(&mut machined, &near);
             let mut light = LightTally::default();
             if let Some(sight) = self.sight {
-                let part = masked(&machined, &near);
                 let map = block.pictures.light.as_mut().filter(|_| post == 0).map(|maps| &mut maps[1]);
-                sight.add(&mut light, &part, window, lattice.step_mm, map);
+                sight.add(&mut light, &machined, window, lattice.step_mm, map);
                 if let Some(removal_mm) = self.polish_mm.filter(|_| post == 0) {
-                    let part = polish::polished(&part, lattice.step_mm, removal_mm);
+                    let part = polish::polished(&machined, lattice.step_mm, removal_mm);
                     sight.add(&mut block.light_polished, &part, window, lattice.step_mm, None);
                 }
             }
             block.light_machined.push(light);
             if post == 0 {
-                block.machined = masked(&machined.crop(window), &block.design);
+                block.machined = machined.crop(window);
             }
         }
         Ok(block)
@@ -428,15 +432,11 @@ fn lower(lowest: &mut Heights, other: &Heights) {
     }
 }
 
-/// The machined surface where there is a design.
-fn masked(machined: &Heights, design: &Heights) -> Heights {
-    let mut masked = machined.clone();
-    for (z, design) in masked.z_mm.iter_mut().zip(&design.z_mm) {
-        if design.is_nan() {
-            *z = f32::NAN;
-        }
+/// Leaves the machined surface where there is a design.
+fn mask(machined: &mut Heights, design: &Heights) {
+    for (z, design) in machined.z_mm.iter_mut().zip(&design.z_mm) {
+        *z = if design.is_nan() { f32::NAN } else { *z };
     }
-    masked
 }
 
 fn swapped(window: Window) -> Window {
