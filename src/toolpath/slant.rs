@@ -31,6 +31,9 @@ const BAND: usize = 64;
 /// How far beside the line heights are known, in units of the grid.
 pub(super) const SIDES: [f64; 4] = [-1.0, -0.5, 0.5, 1.0];
 
+/// Heights of places a unit to both sides that bend by less than this part of one lie in line with what is between.
+const FLAT: f64 = 0.02;
+
 /// What is known beside one position of a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Beside {
@@ -72,10 +75,10 @@ pub(super) fn cutter(shape: Shape, layout: &Layout, site: &Site) -> Result<Cutte
     if layout.on_coarsest_grid() || tip_radius_mm(&shape) == 0.0 {
         return Cutter::new(shape, step_mm, layout.length_mm(), aside_mm, site.tightest);
     }
-    // A unit more or less across than the line; and half a unit is between two of the heights beside it.
+    // A unit more or less across than the line; and up to a unit is between two of the heights beside it.
     let unit_mm = layout.coarsest_mm();
     let across_mm = layout.pitch_mm() * layout.slope.abs() + unit_mm;
-    let longest_mm = layout.pitch_mm().hypot(across_mm).hypot(0.5 * unit_mm);
+    let longest_mm = layout.pitch_mm().hypot(across_mm).hypot(unit_mm);
     Cutter::new(shape, step_mm, longest_mm, aside_mm, site.tightest)
 }
 
@@ -157,9 +160,19 @@ impl Block<'_> {
             envelope.bound_mm[i] = envelope.bound_mm[i].max(z_mm);
             // The last position of a block is the first of the next one.
             if let Some(beside) = envelope.beside.get_mut(i).filter(|beside| beside.cl_mm[0].is_nan()) {
-                let cl_mm = SIDES.map(|side| drop_mm([along, across + side * self.layout.unit_mm]));
-                // Out of reach of everything there is no bound; none is higher than the next one inwards.
-                beside.cl_mm = cl_mm.map(|cl_mm| if cl_mm.is_finite() { cl_mm } else { z_mm });
+                let mut side_mm = |side: f64| {
+                    let cl_mm = drop_mm([along, across + side * self.layout.unit_mm]);
+                    // Out of reach of everything there is no bound; none is higher than the next one inwards.
+                    if cl_mm.is_finite() { cl_mm } else { z_mm }
+                };
+                let (before, after) = (side_mm(-1.0), side_mm(1.0));
+                let bend_mm = (before + after - 2.0 * z_mm).abs();
+                let halves = if bend_mm < FLAT * self.layout.unit_mm {
+                    [before, after].map(|side_mm| 0.5 * (side_mm + z_mm))
+                } else {
+                    [-0.5, 0.5].map(side_mm)
+                };
+                beside.cl_mm = [before, halves[0], halves[1], after];
             }
         }
         let mut wide: Option<(usize, f64)> = None;
