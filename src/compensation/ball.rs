@@ -1,3 +1,4 @@
+use super::blocks::Side;
 use super::field::Field;
 use super::lanes::{LANES, NONE};
 use super::rolling::WIDE;
@@ -145,6 +146,29 @@ impl Ball {
             }
         }
         Some(at)
+    }
+
+    /// How far off the sample stands that tells most of how far the ball rolls over an edge that drops off like this.
+    #[inline(always)]
+    pub fn looks_off(&self, rise_mm: f32) -> i64 {
+        let scale = (1.0 / self.step_mm) as f32;
+        let m = (-2.0 * rise_mm * scale * self.radius as f32).max(0.0).sqrt() as i64;
+        m.clamp(2, FARTHEST as i64)
+    }
+
+    /// Tightens a box by the rise to the samples `m` further to a side.
+    #[inline(always)]
+    pub fn beyond(&self, mut at: Reachable, side: Side, m: f64, rise_mm: f32) -> Option<Reachable> {
+        let none = [-1e30, 1e30];
+        let [next, before] = self.mean_slopes([rise_mm, -rise_mm], m);
+        let z = self.mean_z(&at, m);
+        match side {
+            Side::Right => at.x = self.bound(at.x, at.y, m, next, none[1], z),
+            Side::Left => at.x = self.bound(at.x, at.y, m, none[0], before, z),
+            Side::Up => at.y = self.bound(at.y, at.x, m, next, none[1], z),
+            Side::Down => at.y = self.bound(at.y, at.x, m, none[0], before, z),
+        }
+        (!at.is_empty()).then_some(at)
     }
 
     #[inline(always)]

@@ -20,16 +20,26 @@ fn group(row: &[f32], i: usize) -> &[f32; LANES] {
     &groups(&row[i..i + LANES])[0]
 }
 
-/// The rises of a block; None where it has no data. Samples without data make them huge.
+/// The rises of a block, lane by lane: the least and the greatest of its rows.
+pub(super) struct Measured<V: Vectors> {
+    x_next: V::Group,
+    x_before: V::Group,
+    y_next: V::Group,
+    y_before: V::Group,
+    /// Whether all samples have data.
+    is_whole: bool,
+}
+
+/// The rises of a block; None where it has no data.
 #[inline(always)]
-pub(super) fn measure<V: Vectors>(field: &Field, block: Block) -> Option<Rises> {
+pub(super) fn measure<V: Vectors>(field: &Field, block: Block) -> Option<Measured<V>> {
     let i = PAD + block.first;
     let mut below = V::load(group(field.row(block.a - 1), i));
     let mut z = V::load(group(field.row(block.a), i));
     let mut x_next = V::splat(f32::MAX);
     let mut x_before = V::splat(f32::MIN);
     let (mut y_next, mut y_before) = (x_next, x_before);
-    let (mut lowest, mut highest) = (x_next, x_before);
+    let mut lowest = x_next;
     let mut before = V::subtract(z, below);
     for r in 0..block.rows {
         let row = field.row(block.a + r as i64);
@@ -40,24 +50,48 @@ pub(super) fn measure<V: Vectors>(field: &Field, block: Block) -> Option<Rises> 
         before = V::subtract(above, z);
         y_next = V::less(y_next, before);
         lowest = V::less(lowest, z);
-        highest = V::greater(highest, z);
         below = z;
         z = above;
     }
     let _ = below;
-    if V::at_least(highest, V::splat(LEAST)) == 0 {
+    let is_whole = V::at_least(lowest, V::splat(LEAST)) == u16::MAX;
+    if !is_whole && !has_data::<V>(field, block) {
         return None;
     }
-    let mut rises = Rises {
-        x_next: V::least(x_next),
-        x_before: V::most(x_before),
-        y_next: V::least(y_next),
-        y_before: V::most(y_before),
-    };
-    if V::at_least(lowest, V::splat(LEAST)) != u16::MAX {
-        rises.x_next = f32::MIN;
+    Some(Measured { x_next, x_before, y_next, y_before, is_whole })
+}
+
+#[inline(always)]
+fn has_data<V: Vectors>(field: &Field, block: Block) -> bool {
+    let mut data = 0;
+    for r in 0..block.rows {
+        let z = V::load(group(field.row(block.a + r as i64), PAD + block.first));
+        data |= V::at_least(z, V::splat(LEAST));
     }
-    Some(rises)
+    data != 0
+}
+
+impl<V: Vectors> Measured<V> {
+    /// Whether all of them are held by these rises.
+    #[inline(always)]
+    pub fn is_held(&self, by: &Rises) -> bool {
+        let held = V::at_least(self.x_next, V::splat(by.x_next))
+            & V::at_least(V::splat(by.x_before), self.x_before)
+            & V::at_least(self.y_next, V::splat(by.y_next))
+            & V::at_least(V::splat(by.y_before), self.y_before);
+        self.is_whole && held == u16::MAX
+    }
+
+    /// All of them together; samples without data make them huge.
+    #[inline(always)]
+    pub fn rises(&self) -> Rises {
+        Rises {
+            x_next: if self.is_whole { V::least(self.x_next) } else { f32::MIN },
+            x_before: V::most(self.x_before),
+            y_next: V::least(self.y_next),
+            y_before: V::most(self.y_before),
+        }
+    }
 }
 
 /// The rises of samples, lane by lane, in samples per sample: rows of a block, or samples put
@@ -131,6 +165,77 @@ impl Lanes {
         level
     }
 
+    /// The samples among `of` from which the surface drops off by `most_mm` a sample at most.
+    #[inline(always)]
+    pub fn gentle<V: Vectors>(&self, of: &[u16; ROWS], most_mm: f32) -> [u16; ROWS] {
+        let (most, least) = (V::splat(most_mm), V::splat(-most_mm));
+        let mut gentle = [0; ROWS];
+        for r in 0..ROWS {
+            if of[r] != 0 {
+                let lowest = V::less(V::load(&self.x_next[r]), V::load(&self.y_next[r]));
+                let highest = V::greater(V::load(&self.x_before[r]), V::load(&self.y_before[r]));
+                gentle[r] = of[r] & V::at_least(most, highest) & V::at_least(lowest, least);
+            }
+        }
+        gentle
+    }
+
+    /// The samples among `of` whose surface rises by no more than `within_mm` more to the next sample than from the
+    /// one before.
+    #[inline(always)]
+    pub fn no_valley<V: Vectors>(&self, of: &[u16; ROWS], within_mm: f32) -> [u16; ROWS] {
+        let within = V::splat(within_mm);
+        let mut these = [0; ROWS];
+        for r in 0..ROWS {
+            if of[r] != 0 {
+                let x = V::subtract(V::load(&self.x_next[r]), V::load(&self.x_before[r]));
+                let y = V::subtract(V::load(&self.y_next[r]), V::load(&self.y_before[r]));
+                these[r] = of[r] & V::at_least(within, V::greater(x, y));
+            }
+        }
+        these
+    }
+
+    /// The samples among `of` from which the surface drops off by more than `most_mm` towards one side.
+    #[inline(always)]
+    pub fn dropping<V: Vectors>(&self, of: &[u16; ROWS], side: Side, most_mm: f32) -> [u16; ROWS] {
+        let (most, least) = (V::splat(most_mm), V::splat(-most_mm));
+        let mut these = [0; ROWS];
+        for r in 0..ROWS {
+            if of[r] != 0 {
+                let kept = match side {
+                    Side::Right => V::at_least(V::load(&self.x_next[r]), least),
+                    Side::Left => V::at_least(most, V::load(&self.x_before[r])),
+                    Side::Up => V::at_least(V::load(&self.y_next[r]), least),
+                    Side::Down => V::at_least(most, V::load(&self.y_before[r])),
+                };
+                these[r] = of[r] & !kept;
+            }
+        }
+        these
+    }
+
+    /// The rises of some samples together.
+    #[inline(always)]
+    pub fn around<V: Vectors>(&self, of: &[u16; ROWS]) -> Rises {
+        let (mut x_next, mut x_before) = (V::splat(f32::MAX), V::splat(f32::MIN));
+        let (mut y_next, mut y_before) = (x_next, x_before);
+        for (r, &bits) in of.iter().enumerate() {
+            if bits != 0 {
+                x_next = V::choose(bits, V::less(x_next, V::load(&self.x_next[r])), x_next);
+                x_before = V::choose(bits, V::greater(x_before, V::load(&self.x_before[r])), x_before);
+                y_next = V::choose(bits, V::less(y_next, V::load(&self.y_next[r])), y_next);
+                y_before = V::choose(bits, V::greater(y_before, V::load(&self.y_before[r])), y_before);
+            }
+        }
+        Rises {
+            x_next: V::least(x_next),
+            x_before: V::most(x_before),
+            y_next: V::least(y_next),
+            y_before: V::most(y_before),
+        }
+    }
+
     /// Those of one sample.
     #[inline(always)]
     pub fn at(&self, r: usize, lane: usize) -> Rises {
@@ -166,4 +271,48 @@ impl Lanes {
             *data = ((1u32 << lanes) - 1) as u16;
         }
     }
+}
+
+/// Where a neighbour lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Right,
+    Left,
+    Up,
+    Down,
+}
+
+impl Side {
+    pub const ALL: [Side; 4] = [Side::Right, Side::Left, Side::Up, Side::Down];
+}
+
+/// The least rise from some samples of a block to those `m` further to a side.
+#[inline(always)]
+pub(super) fn least_rise<V: Vectors>(
+    field: &Field,
+    block: Block,
+    of: &[u16; ROWS],
+    side: Side,
+    m: i64,
+) -> f32 {
+    let i = PAD + block.first;
+    let mut least = V::splat(f32::MAX);
+    for (r, &bits) in of.iter().enumerate() {
+        if bits != 0 {
+            let a = block.a + r as i64;
+            let z = V::load(group(field.row(a), i));
+            let (of, i) = match side {
+                Side::Right => (a, i + m as usize),
+                Side::Left => (a, i - m as usize),
+                Side::Up => (a + m, i),
+                Side::Down => (a - m, i),
+            };
+            if of < 0 || of >= field.rows as i64 {
+                return f32::MIN;
+            }
+            let there = V::load(group(field.row(of), i));
+            least = V::choose(bits, V::less(least, V::subtract(there, z)), least);
+        }
+    }
+    V::least(least)
 }

@@ -102,10 +102,14 @@ pub(super) fn body<V: Vectors, P: Pairs>(
         return;
     }
     let rolling = Rolling::<V>::new(ball, pairs.is_whole());
-    *given_up = match fed {
-        Some((feed, progress)) => !search(rolling, profile, field, pairs, out, Some(feed), progress, most),
-        None => !search(rolling, profile, field, pairs, out, None, &mut Progress::new(), most),
+    // One call, for all of the search is compiled into it.
+    let mut anew = Progress::new();
+    let (feed, progress) = match fed {
+        Some((feed, progress)) => (Some(feed), progress),
+        None => (None, &mut anew),
     };
+    *given_up = !search(rolling, profile, field, pairs, out, feed, progress, most);
+    V::streamed();
 }
 
 widest! {
@@ -162,7 +166,7 @@ fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
     // Samples before the first target raise few.
     let lead = if start == 0 { radius } else { 0.0 };
     if let Some(feed) = &mut feed {
-        feed.after(start as i64, out);
+        feed.after::<V>(start as i64, out);
     }
     for a in (start..rows).step_by(ROWS) {
         if feed.as_ref().is_some_and(|feed| feed.is_done()) {
@@ -180,11 +184,11 @@ fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
             return false;
         }
         if let Some(feed) = &mut feed {
-            feed.after((a + count) as i64, out);
+            feed.after::<V>((a + count) as i64, out);
         }
     }
     if let Some(feed) = &mut feed {
-        feed.end(out);
+        feed.end::<V>(out);
     }
     *progress = Progress { next: rows, known: search.known };
     true
@@ -242,22 +246,24 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
         let mut level = Level { first: 0, len: 0, known: none };
         for column in 0..self.known.len() - 1 {
             let block = Block { a, first: column * LANES, rows };
-            let Some(all) = measure::<V>(self.field, block) else {
+            let Some(measured) = measure::<V>(self.field, block) else {
                 self.raise_level(a, rows, &mut level, out);
                 continue;
             };
-            if level.len > 0 && level.known.is_facet && level.known.rises.holds(&all) {
+            if level.len > 0 && level.known.is_facet && measured.is_held(&level.known.rises) {
                 level.len += LANES;
                 self.known[column][0] = level.known;
                 continue;
             }
             let [one, other] = self.known[column];
-            let grain_mm = self.grain_mm(block);
-            let known = if one.rises.holds(&all) {
+            let mut of_edge = None;
+            let known = if measured.is_held(&one.rises) {
                 Some(one)
-            } else if other.rises.holds(&all) {
+            } else if measured.is_held(&other.rises) {
                 Some(other)
             } else {
+                let (all, grain_mm) = (measured.rises(), self.grain_mm(block));
+                of_edge = Some((all, grain_mm));
                 self.facet(&all, grain_mm)
             };
             self.raise_level(a, rows, &mut level, out);
@@ -269,6 +275,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                     level = Level { first: block.first, len: LANES, known };
                 }
                 None => {
+                    let Some((all, grain_mm)) = of_edge else { continue };
                     if self.in_reach(block, &all) {
                         self.split(block, grain_mm, out);
                         if self.work as f64 > self.most {
@@ -411,11 +418,13 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
 /// From the first to the last of these samples of a block, row by row.
 #[inline(always)]
 pub(super) fn spans_of(block: Block, bits: &[u16; ROWS]) -> [Span; ROWS] {
-    bits.map(|bits| {
+    let mut spans = [[0; 2]; ROWS];
+    for (span, &bits) in spans.iter_mut().zip(bits) {
         let first = bits.trailing_zeros() as usize;
         let end = LANES - bits.leading_zeros() as usize;
-        [block.first + first, end.saturating_sub(first)]
-    })
+        *span = [block.first + first, end.saturating_sub(first)];
+    }
+    spans
 }
 
 #[inline(always)]

@@ -1,8 +1,12 @@
 use super::ball::FARTHEST;
 use super::blocks::ROWS;
 use super::field::{Field, Sense, Targets};
+use super::lanes::Vectors;
 use super::pairs::OnSamples;
 use crate::grid::{Heights, Window};
+
+/// Bytes of targets that a core's cache may well hold until they are looked at.
+const CACHE: usize = 1 << 20;
 
 /// How far a field was fed: rows taken, and targets opened and given.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +31,8 @@ pub(super) struct Feed<'a, 'b> {
     /// Where those from `first` on go.
     to: &'a mut [&'b mut [f32]],
     first: usize,
+    /// Whether they are too many for a core's cache.
+    is_large: bool,
     pub fed: Fed,
 }
 
@@ -60,7 +66,9 @@ impl<'a, 'b> Feed<'a, 'b> {
         fed: Fed,
     ) -> Feed<'a, 'b> {
         let level = on.target_row - on.input_row;
-        Feed { h, input, sense, reach: on.reach, every: on.every, level, all: on.target_rows, to, first, fed }
+        let is_large = to.iter().map(|to| size_of_val(&**to)).sum::<usize>() > CACHE;
+        let (reach, every, all) = (on.reach, on.every, on.target_rows);
+        Feed { h, input, sense, reach, every, level, all, to, first, is_large, fed }
     }
 
     /// Whether all targets that are wanted are given.
@@ -94,30 +102,35 @@ impl<'a, 'b> Feed<'a, 'b> {
 
     /// Gives the targets that rows from `a` on cannot reach.
     #[inline(always)]
-    pub fn after(&mut self, a: i64, targets: &mut Targets) {
+    pub fn after<V: Vectors>(&mut self, a: i64, targets: &mut Targets) {
         while self.fed.given < self.fed.opened
             && !self.is_done()
             && self.level + (self.fed.given as i64) * self.every + self.reach < a
         {
-            self.give(targets);
+            self.give::<V>(targets);
         }
     }
 
     /// Gives all that is left.
     #[inline(always)]
-    pub fn end(&mut self, targets: &mut Targets) {
+    pub fn end<V: Vectors>(&mut self, targets: &mut Targets) {
         while !self.is_done() {
             if self.fed.given == self.fed.opened {
                 targets.open(self.fed.opened);
                 self.fed.opened += 1;
             }
-            self.give(targets);
+            self.give::<V>(targets);
         }
     }
 
     #[inline(always)]
-    fn give(&mut self, targets: &mut Targets) {
-        self.sense.give_row(self.to[self.fed.given - self.first], targets.row(self.fed.given));
+    fn give<V: Vectors>(&mut self, targets: &mut Targets) {
+        let (to, from) = (&mut *self.to[self.fed.given - self.first], targets.row(self.fed.given));
+        if self.is_large {
+            self.sense.stream_row::<V>(to, from);
+        } else {
+            self.sense.give_row(to, from);
+        }
         targets.close();
         self.fed.given += 1;
     }

@@ -1,4 +1,4 @@
-use super::lanes::{LANES, LEAST, NONE};
+use super::lanes::{LANES, LEAST, NONE, Vectors, groups, groups_mut};
 use super::memory::large_pages;
 use crate::grid::{Heights, Window};
 
@@ -51,6 +51,25 @@ impl Sense {
     }
 }
 
+impl Sense {
+    /// [`Sense::give_row`] past the caches.
+    #[inline(always)]
+    pub fn stream_row<V: Vectors>(self, to: &mut [f32], from: &[f32]) {
+        let first = line(to).min(to.len());
+        let (before, to) = to.split_at_mut(first);
+        self.give_row(before, from);
+        let from = &from[first..];
+        let whole = to.len() / LANES * LANES;
+        self.give_row(&mut to[whole..], &from[whole.min(from.len())..]);
+        let (zero, none, least) = (V::splat(0.0), V::splat(f32::NAN), V::splat(LEAST));
+        for (to, z) in groups_mut(to).iter_mut().zip(groups(from)) {
+            let z = V::load(z);
+            let z_mm = if self == Sense::Raise { z } else { V::subtract(zero, z) };
+            V::stream(V::choose(V::at_least(z, least), z_mm, none), to);
+        }
+    }
+}
+
 /// Rows of heights as kernels read them: padded, no data as [`NONE`], with a row of no data below
 /// the first and above the last. A field may hold only its latest rows.
 pub(super) struct Field {
@@ -58,15 +77,18 @@ pub(super) struct Field {
     /// Columns of data; column 0 stands at PAD in a row.
     pub columns: usize,
     stride: usize,
-    /// Row -1 stands at 0; where not all rows are held, one less than their power of two.
+    /// Where the memory of the rows starts: at a cache line.
+    origin: usize,
+    /// Row -1 stands there; where not all rows are held, one less than their power of two.
     mask: usize,
     z: Vec<f32>,
 }
 
 impl Field {
     pub fn empty(columns: usize, rows: usize) -> Field {
-        let stride = stride(columns);
-        Field { rows, columns, stride, mask: usize::MAX, z: vec![NONE; stride * (rows + 2)] }
+        let mut field = Field { rows, columns, stride: 0, origin: 0, mask: usize::MAX, z: Vec::new() };
+        field.hold(Window { column: 0, row: 0, columns, rows }, usize::MAX);
+        field
     }
 
     /// The samples of `window`, as far as `h` has them.
@@ -92,13 +114,14 @@ impl Field {
         let all = window.rows + 2;
         let held = if held < all { held.next_power_of_two() } else { all };
         self.mask = if held < all { held - 1 } else { usize::MAX };
-        resize(&mut self.z, self.stride * held);
+        resize(&mut self.z, self.stride * held + LANES);
+        self.origin = line(&self.z);
     }
 
     /// Takes a row, from -1 to `rows`, of the samples of `window`.
     #[inline(always)]
     pub fn take(&mut self, row: i64, h: &Heights, window: Window, sense: Sense) {
-        let to = &mut self.z[((row + 1) as usize & self.mask) * self.stride..][..self.stride];
+        let to = self.padded_mut(row);
         let row = window.row + row;
         match h.window.intersection(&window).filter(|shared| row >= shared.row && row < shared.row_end()) {
             None => to.fill(NONE),
@@ -116,11 +139,16 @@ impl Field {
     /// Row `row`, from -1 to `rows`, with its padding.
     #[inline(always)]
     pub fn row(&self, row: i64) -> &[f32] {
-        &self.z[((row + 1) as usize & self.mask) * self.stride..][..self.stride]
+        &self.z[self.origin + ((row + 1) as usize & self.mask) * self.stride..][..self.stride]
+    }
+
+    #[inline(always)]
+    fn padded_mut(&mut self, row: i64) -> &mut [f32] {
+        &mut self.z[self.origin + ((row + 1) as usize & self.mask) * self.stride..][..self.stride]
     }
 
     pub fn row_mut(&mut self, row: usize) -> &mut [f32] {
-        &mut self.z[((row + 1) & self.mask) * self.stride..][..self.stride]
+        self.padded_mut(row as i64)
     }
 }
 
@@ -132,6 +160,11 @@ fn resize(z: &mut Vec<f32>, len: usize) {
         z.clear();
     }
     z.resize(len, NONE);
+}
+
+/// The first of these that starts a cache line.
+fn line(z: &[f32]) -> usize {
+    z.as_ptr().align_offset(size_of::<[f32; LANES]>()).min(LANES)
 }
 
 /// An odd number of cache lines: rows a power of two apart would share cache sets.
@@ -177,7 +210,7 @@ impl Targets {
         self.held = held.min(rows);
         (self.first, self.place) = (0, 0);
         resize(&mut self.z, self.stride * self.held + LANES);
-        self.origin = self.z.as_ptr().align_offset(size_of::<[f32; LANES]>()).min(LANES);
+        self.origin = line(&self.z);
     }
 
     /// Makes a row ready to be raised.

@@ -50,6 +50,22 @@ pub(super) trait Vectors {
     fn inverse_root(a: Self::Group) -> Self::Group;
     const INVERSE_ERROR: f32;
 
+    /// Stores past the caches; `z` starts a cache line. [`Vectors::streamed`] follows before another thread looks at it.
+    #[inline(always)]
+    fn stream(group: Self::Group, z: &mut [f32; LANES]) {
+        Self::store(group, z);
+    }
+
+    /// Waits for what was streamed.
+    #[inline(always)]
+    fn streamed() {}
+
+    /// Does some work in a function of its own, compiled for the same processor: it stands once in the program, not
+    /// wherever it is called.
+    fn apart<W: Work<Self>>(work: W) -> W::Done
+    where
+        Self: Sized;
+
     /// The least of all lanes.
     #[inline(always)]
     fn least(a: Self::Group) -> f32 {
@@ -65,6 +81,13 @@ pub(super) trait Vectors {
         Self::store(a, &mut lanes);
         lanes.iter().fold(f32::MIN, |m, &z| if z > m { z } else { m })
     }
+}
+
+/// Something to do with these vectors.
+pub(super) trait Work<V> {
+    type Done;
+
+    fn run(self) -> Self::Done;
 }
 
 /// Any processor.
@@ -131,6 +154,11 @@ impl Vectors for Portable {
     #[inline(always)]
     fn choose(bits: u16, a: Self::Group, b: Self::Group) -> Self::Group {
         std::array::from_fn(|lane| if bits >> lane & 1 == 1 { a[lane] } else { b[lane] })
+    }
+
+    #[inline(never)]
+    fn apart<W: Work<Self>>(work: W) -> W::Done {
+        work.run()
     }
 
     const INVERSE_ERROR: f32 = 1e-6;
@@ -222,6 +250,30 @@ impl Vectors for Avx2 {
         [half(i32::from(bits), a[0], b[0]), half(i32::from(bits >> 8), a[1], b[1])]
     }
 
+    #[inline(always)]
+    fn streamed() {
+        unsafe { x86::_mm_sfence() }
+    }
+
+    #[inline(always)]
+    fn stream(group: Self::Group, z: &mut [f32; LANES]) {
+        assert!(z.as_ptr().addr().is_multiple_of(size_of_val(z)));
+        unsafe {
+            x86::_mm256_stream_ps(z.as_mut_ptr(), group[0]);
+            x86::_mm256_stream_ps(z.as_mut_ptr().add(8), group[1]);
+        }
+    }
+
+    #[inline(always)]
+    fn apart<W: Work<Self>>(work: W) -> W::Done {
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        #[inline(never)]
+        fn run<W: Work<Avx2>>(work: W) -> W::Done {
+            work.run()
+        }
+        unsafe { run(work) }
+    }
+
     const INVERSE_ERROR: f32 = 4e-4;
 
     #[inline(always)]
@@ -296,6 +348,27 @@ impl Vectors for Avx512 {
     #[inline(always)]
     fn choose(bits: u16, a: Self::Group, b: Self::Group) -> Self::Group {
         unsafe { x86::_mm512_mask_blend_ps(bits, b, a) }
+    }
+
+    #[inline(always)]
+    fn streamed() {
+        unsafe { x86::_mm_sfence() }
+    }
+
+    #[inline(always)]
+    fn stream(group: Self::Group, z: &mut [f32; LANES]) {
+        assert!(z.as_ptr().addr().is_multiple_of(size_of_val(z)));
+        unsafe { x86::_mm512_stream_ps(z.as_mut_ptr().cast(), group) }
+    }
+
+    #[inline(always)]
+    fn apart<W: Work<Self>>(work: W) -> W::Done {
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,lzcnt,popcnt")]
+        #[inline(never)]
+        fn run<W: Work<Avx512>>(work: W) -> W::Done {
+            work.run()
+        }
+        unsafe { run(work) }
     }
 
     const INVERSE_ERROR: f32 = 1e-4;

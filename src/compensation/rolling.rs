@@ -3,7 +3,9 @@
 use super::ball::{Ball, Reachable};
 use super::blocks::{Block, Lanes, ROWS};
 use super::boxes::Boxes;
+use super::bundle::raise_bundle;
 use super::contact::{BLOCK_WORK, MANY, On, ROW_WORK, Touch, count, spans_of};
+use super::edges::Edges;
 use super::field::{Field, PAD, Targets};
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors};
@@ -19,10 +21,10 @@ const FAR_WORK: usize = 800;
 /// What a sample on its own costs, and each target row that it may raise.
 const SINGLE_WORK: usize = 30;
 const SINGLE_ROW_WORK: usize = 10;
-const WIDE_ROW_WORK: usize = 22;
+pub(super) const WIDE_ROW_WORK: usize = 22;
 
 /// What narrowing up to [`LANES`] rows of a box costs.
-const NARROW_WORK: usize = 70;
+pub(super) const NARROW_WORK: usize = 70;
 
 /// Groups of lanes from which a sample's box is worth tightening by far neighbours.
 pub(super) const WIDE: f64 = 100.0;
@@ -44,13 +46,13 @@ const TALL: f64 = 3.0;
 
 /// A ball that rolls over the samples.
 pub(super) struct Rolling<V: Vectors> {
-    ball: Ball,
-    moderate: Option<Moderate>,
+    pub(super) ball: Ball,
+    pub(super) moderate: Option<Moderate>,
     packed: Lanes,
     /// Where the packed samples come from: row and lane.
     from: [[u8; 2]; ROWS * LANES],
     boxes: Boxes<V>,
-    row_bounds: RowBounds,
+    pub(super) row_bounds: RowBounds,
     /// Whether all offsets are whole samples.
     whole: bool,
 }
@@ -95,7 +97,16 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
         out: &mut Targets,
     ) -> usize {
         let mut work = 0;
-        let count_left = count(left);
+        let mut left = *left;
+        if let Some(samples) = on.pairs.on_samples() {
+            let (field, left) = (on.field, &mut left);
+            work += V::apart(Edges { rolling: self, field, on: samples, block, lanes, left, out });
+        }
+        let count_left = count(&left);
+        if count_left == 0 {
+            return work;
+        }
+        let left = &left;
         if count_left > MOST {
             self.boxes.bounded = 0;
             self.boxes.fill(lanes, left, &self.ball, &self.moderate, self.whole);
@@ -140,6 +151,13 @@ fn raise<V: Vectors, P: Pairs>(
 ) -> usize {
     if let Some(samples) = on.pairs.on_samples() {
         let offsets = Offsets::of(at);
+        let [first, len] = spans[0];
+        if len == LANES && offsets.taps() > 3 {
+            let block = Block { a, first, rows: spans.len() };
+            if raise_bundle::<V>(on.field, samples, block, &[u16::MAX; ROWS], &offsets, out) {
+                return BLOCK_WORK.max(offsets.taps() * spans.len());
+            }
+        }
         raise_spans::<V>(on.field, samples, a, spans, &offsets, out);
         let taps = offsets.taps() * spans.iter().map(|[_, len]| len).sum::<usize>() / LANES;
         return BLOCK_WORK.max(taps);

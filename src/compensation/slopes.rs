@@ -52,15 +52,6 @@ impl Rises {
         if x > y { x } else { y }
     }
 
-    /// Whether what these bound is bounded by the others too.
-    #[inline(always)]
-    pub fn holds(&self, other: &Rises) -> bool {
-        self.x_next <= other.x_next
-            && self.x_before >= other.x_before
-            && self.y_next <= other.y_next
-            && self.y_before >= other.y_before
-    }
-
     /// Rises that may each be this much different.
     #[inline(always)]
     pub fn wider(&self, by_mm: f32) -> Rises {

@@ -107,6 +107,12 @@ impl Stencil {
         size_of_val(self.values.as_slice()) + size_of_val(self.arcs.as_slice())
     }
 
+    /// All values, in which arcs stand one after the other.
+    #[inline(always)]
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
     /// The samples k rows above the axis.
     #[inline(always)]
     pub fn arc(&self, k: i64) -> Option<ArcRef<'_>> {

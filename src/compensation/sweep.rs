@@ -211,7 +211,7 @@ pub(super) struct Moderate {
     /// Greatest slope for which this holds.
     pub steepest: f32,
     /// 1.5 D.
-    spread: f32,
+    pub spread: f32,
     radius: f32,
     /// Half a sample, and room for rounding.
     half: f32,
