@@ -411,6 +411,7 @@ fn passes_lie_alike_in_all_posts_of_a_job() {
         ("0.015", format!("{finish}direction_deg = 158\n")),
         ("0.02", format!("{rest}direction_deg = 10\n")),
         ("0.02", format!("{rest}direction_deg = 73\n")),
+        ("0.02", format!("{rest}direction_deg = 110\n")),
     ];
     for (step_mm, wanted) in cases {
         let step = format!("step_mm = {step_mm}");

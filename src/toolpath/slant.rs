@@ -32,7 +32,7 @@ const BAND: usize = 64;
 pub(super) const SIDES: [f64; 4] = [-1.0, -0.5, 0.5, 1.0];
 
 /// Heights of places a unit to both sides that bend by less than this part of one lie in line with what is between.
-const FLAT: f64 = 0.02;
+const FLAT: f64 = 0.0002;
 
 /// What is known beside one position of a line.
 #[derive(Clone, Copy, Debug)]
@@ -75,10 +75,10 @@ pub(super) fn cutter(shape: Shape, layout: &Layout, site: &Site) -> Result<Cutte
     if layout.on_coarsest_grid() || tip_radius_mm(&shape) == 0.0 {
         return Cutter::new(shape, step_mm, layout.length_mm(), aside_mm, site.tightest);
     }
-    // A unit more or less across than the line; and up to a unit is between two of the heights beside it.
+    // A unit more or less across than the line; and half a unit is between two of the heights beside it where they bend.
     let unit_mm = layout.coarsest_mm();
     let across_mm = layout.pitch_mm() * layout.slope.abs() + unit_mm;
-    let longest_mm = layout.pitch_mm().hypot(across_mm).hypot(unit_mm);
+    let longest_mm = layout.pitch_mm().hypot(across_mm).hypot(0.5 * unit_mm);
     Cutter::new(shape, step_mm, longest_mm, aside_mm, site.tightest)
 }
 
