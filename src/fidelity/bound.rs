@@ -121,13 +121,17 @@ fn lower(least: &Heights, blocks: Window, lowest: &Heights, design: &Heights) ->
             let bound = least.row(row)[(column - least.window.column) as usize];
             let from = (part.column - lowest.window.column) as usize;
             let cut = |heights: &'_ Heights, row| -> [f32; BLOCK as usize] {
-                let mut line = [f32::NEG_INFINITY; BLOCK as usize];
-                line[..part.columns].copy_from_slice(&heights.row(row)[from..from + part.columns]);
-                line
+                let row = &heights.row(row)[from..from + part.columns];
+                row.first_chunk().copied().unwrap_or_else(|| {
+                    let mut line = [f32::NEG_INFINITY; BLOCK as usize];
+                    line[..part.columns].copy_from_slice(row);
+                    line
+                })
             };
             let could = (part.row..part.row_end()).any(|row| {
                 let (lowest, design) = (cut(lowest, row), cut(design, row));
-                lowest.iter().zip(&design).any(|(z, design)| z > design && *z > bound)
+                // Without branches, so that all of them are looked at together.
+                lowest.iter().zip(&design).fold(false, |any, (z, design)| any | ((z > design) & (*z > bound)))
             });
             if could {
                 let ends = [part.column, part.row, part.column_end(), part.row_end()];
