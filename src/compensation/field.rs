@@ -1,5 +1,5 @@
 use super::lanes::{LANES, LEAST, NONE, Vectors, groups, groups_mut};
-use super::memory::large_pages;
+use super::memory::untouched;
 use crate::grid::{Heights, Window};
 
 /// Positions that the widest kernel takes at once.
@@ -88,6 +88,7 @@ impl Field {
     pub fn empty(columns: usize, rows: usize) -> Field {
         let mut field = Field { rows, columns, stride: 0, origin: 0, mask: usize::MAX, z: Vec::new() };
         field.hold(Window { column: 0, row: 0, columns, rows }, usize::MAX);
+        field.z.fill(NONE);
         field
     }
 
@@ -114,7 +115,7 @@ impl Field {
         let all = window.rows + 2;
         let held = if held < all { held.next_power_of_two() } else { all };
         self.mask = if held < all { held - 1 } else { usize::MAX };
-        resize(&mut self.z, self.stride * held + LANES);
+        untouched(&mut self.z, self.stride * held + LANES);
         self.origin = line(&self.z);
     }
 
@@ -150,16 +151,6 @@ impl Field {
     pub fn row_mut(&mut self, row: usize) -> &mut [f32] {
         self.padded_mut(row as i64)
     }
-}
-
-/// Takes what is missing as no data.
-fn resize(z: &mut Vec<f32>, len: usize) {
-    if z.capacity() < len {
-        *z = vec![0.0; len];
-        large_pages(z);
-        z.clear();
-    }
-    z.resize(len, NONE);
 }
 
 /// The first of these that starts a cache line.
@@ -209,7 +200,7 @@ impl Targets {
         self.stride = ((columns + TILE).div_ceil(LANES) | 1) * LANES;
         self.held = held.min(rows);
         (self.first, self.place) = (0, 0);
-        resize(&mut self.z, self.stride * self.held + LANES);
+        untouched(&mut self.z, self.stride * self.held + LANES);
         self.origin = line(&self.z);
     }
 
