@@ -64,9 +64,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
             println!(
                 "{:.1} % of the area was looked at{}: the deepest is the deepest there, and after +- stands a standard error",
                 100.0 * fraction,
-                match &checked.smallest_set {
-                    Some(set) if set.standard_error.is_none() =>
-                        " under each cutter, all of it under the set",
+                // A share of one square has no standard error either.
+                match (arguments.share, &checked.smallest_set) {
+                    (None, Some(_)) => " under each cutter, all of it under the set",
                     _ => "",
                 }
             );

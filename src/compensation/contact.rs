@@ -33,7 +33,8 @@ pub(super) const BLOCK_WORK: usize = 60;
 /// What bounding a row of samples one by one costs.
 pub(super) const ROW_WORK: usize = 90;
 
-/// Part of the work of taking every sample that the first rows may take more than their share.
+/// Part of the work of taking every sample that the first rows may take more than their share. Under rows of targets far
+/// apart they come before the first target and take as much as the others.
 const ALLOWANCE: f64 = 0.05;
 
 /// Samples of a block that share offsets, at least, for these to be looked for.
