@@ -20,8 +20,10 @@ pub(super) trait Eight {
     /// The greater of each lane; lanes are numbers.
     fn greater(a: Self::Group, b: Self::Group) -> Self::Group;
     fn less(a: Self::Group, b: Self::Group) -> Self::Group;
-    /// Lanes where a < b, as bits.
-    fn is_less(a: Self::Group, b: Self::Group) -> u8;
+    /// Of these lanes, as bits, those where a < b.
+    fn is_less(bits: u8, a: Self::Group, b: Self::Group) -> u8;
+    /// Those where low <= a <= high.
+    fn within(bits: u8, low: Self::Group, a: Self::Group, high: Self::Group) -> u8;
     /// `a` in the lanes of these bits and `b` in the others.
     fn choose(bits: u8, a: Self::Group, b: Self::Group) -> Self::Group;
     /// Writes `value` to the lanes of these bits.
@@ -34,6 +36,13 @@ pub(super) trait Eight {
     fn after4(a: Self::Group, before: Self::Group) -> Self::Group;
     /// The last lane in all.
     fn last(a: Self::Group) -> Self::Group;
+
+    #[inline(always)]
+    fn lane(a: Self::Group, lane: usize) -> f64 {
+        let mut all = [0.0; EIGHT];
+        Self::store(a, &mut all);
+        all[lane]
+    }
 }
 
 /// Any processor.
@@ -88,8 +97,14 @@ impl Eight for Portable {
     }
 
     #[inline(always)]
-    fn is_less(a: Self::Group, b: Self::Group) -> u8 {
-        (0..EIGHT).fold(0, |bits, lane| bits | u8::from(a[lane] < b[lane]) << lane)
+    fn is_less(bits: u8, a: Self::Group, b: Self::Group) -> u8 {
+        (0..EIGHT).fold(0, |found, lane| found | u8::from(a[lane] < b[lane]) << lane) & bits
+    }
+
+    #[inline(always)]
+    fn within(bits: u8, low: Self::Group, a: Self::Group, high: Self::Group) -> u8 {
+        let inside = |lane: usize| u8::from(low[lane] <= a[lane] && a[lane] <= high[lane]) << lane;
+        (0..EIGHT).fold(0, |found, lane| found | inside(lane)) & bits
     }
 
     #[inline(always)]
@@ -176,8 +191,16 @@ impl Eight for Avx512 {
     }
 
     #[inline(always)]
-    fn is_less(a: Self::Group, b: Self::Group) -> u8 {
-        unsafe { x86::_mm512_cmp_pd_mask::<{ x86::_CMP_LT_OQ }>(a, b) }
+    fn is_less(bits: u8, a: Self::Group, b: Self::Group) -> u8 {
+        unsafe { x86::_mm512_mask_cmp_pd_mask::<{ x86::_CMP_LT_OQ }>(bits, a, b) }
+    }
+
+    #[inline(always)]
+    fn within(bits: u8, low: Self::Group, a: Self::Group, high: Self::Group) -> u8 {
+        unsafe {
+            let above = x86::_mm512_mask_cmp_pd_mask::<{ x86::_CMP_LE_OQ }>(bits, low, a);
+            x86::_mm512_mask_cmp_pd_mask::<{ x86::_CMP_LE_OQ }>(above, a, high)
+        }
     }
 
     #[inline(always)]

@@ -65,14 +65,14 @@ pub(super) fn lay_between(bounds: &Bounds, exact: &[f64], measure: &Measure) -> 
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
     const MEASURE: Measure = Measure { unit_mm: 0.01, pitch_mm: 0.01, stepover_mm: 0.05, tip_mm: 0.5 };
 
     /// The objective by its definition.
-    fn cost(vertices: &[Vertex], exact: &[f64], measure: &Measure) -> f64 {
+    pub(in super::super) fn cost(vertices: &[Vertex], exact: &[f64], measure: &Measure) -> f64 {
         let weights = weights(exact, measure);
         let mut sum = 0.0;
         for pair in vertices.windows(2) {

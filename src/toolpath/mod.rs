@@ -18,6 +18,7 @@ mod ground;
 mod job_grid;
 mod levels;
 mod link;
+mod misfit;
 mod passes;
 mod pen;
 mod ramp;

@@ -2,23 +2,18 @@
 //! positions at a time.
 
 use super::eight::{EIGHT, Eight, Portable};
-use super::ends::{BLOCK, FLANKS, Measure, weights};
+use super::ends::{BLOCK, Measure};
 use super::funnel::Vertex;
+use super::misfit::{SPAN, Sums};
 
 /// A cost that nothing undercuts, for positions without such a state.
 const ABSENT: f64 = f64::NEG_INFINITY;
 
-/// Eight positions.
+/// What eight positions may be passed between.
 #[derive(Clone)]
 struct Positions {
     low: [f64; EIGHT],
     high: [f64; EIGHT],
-    exact: [f64; EIGHT],
-    w: [f64; EIGHT],
-    /// What is added to a point's height where moves begin at it.
-    turn: [f64; EIGHT],
-    /// Sums up to and with each position, of w, w g and w g^2 for the slope g that leads to it.
-    sums: [[f64; EIGHT]; 3],
 }
 
 /// One grid point between the bounds of each of eight positions, and the cheapest way to it.
@@ -46,13 +41,18 @@ pub(super) struct Bounds<'a> {
 pub(super) struct Table {
     count: usize,
     positions: Vec<Positions>,
+    sums: Vec<Sums>,
+    /// Exact heights.
+    exact: Vec<f64>,
+    /// What is added to a point's height where moves begin at it.
+    turns: Vec<f64>,
     /// 1 over the distance in positions, which is less [`EIGHT`] than the index; 0 up to there.
     part: Vec<f64>,
-    /// The lowest points of all positions, the second lowest, and so on.
-    layers: Vec<Vec<Points>>,
+    /// Points at a position at most.
+    layers: usize,
+    /// Of each group its positions' lowest points, the second lowest, and so on.
+    points: Vec<Points>,
     block: f64,
-    slope_cost: f64,
-    height_cost: f64,
 }
 
 impl Table {
@@ -61,48 +61,35 @@ impl Table {
         let Bounds { low, high, ends, off } = bounds;
         let count = low.len();
         let groups = count.div_ceil(EIGHT);
-        let weights = weights(exact, measure);
-        // Past the end no line is between the bounds.
-        let end = Positions {
-            low: [f64::INFINITY; EIGHT],
-            high: [f64::NEG_INFINITY; EIGHT],
-            exact: [0.0; EIGHT],
-            w: [0.0; EIGHT],
-            turn: [0.0; EIGHT],
-            sums: [[0.0; EIGHT]; 3],
+        let reach = |i: usize| {
+            let first = (ends[i][0] - off[i][0]).ceil();
+            (first, ((ends[i][1] - off[i][0]).floor() - first).max(0.0) as usize + 1)
         };
+        let layers = (0..count).map(|i| reach(i).1).max().unwrap_or(1);
+        // Past the end no line is between the bounds.
+        let end = Positions { low: [f64::INFINITY; EIGHT], high: [f64::NEG_INFINITY; EIGHT] };
+        let none = Points { z: [0.0; EIGHT], cost: [ABSENT; EIGHT], from: [0; EIGHT] };
         let mut table = Table {
             count,
             positions: vec![end; groups],
+            sums: Sums::along(exact, measure),
+            exact: exact.to_vec(),
+            turns: off.iter().map(|off| off[1]).collect(),
             part: (0..=(groups + 1) * EIGHT)
                 .map(|i| if i > EIGHT { 1.0 / (i - EIGHT) as f64 } else { 0.0 })
                 .collect(),
-            layers: Vec::new(),
+            layers,
+            points: vec![none; groups * layers],
             block: BLOCK / measure.pitch_mm,
-            slope_cost: (measure.unit_mm / measure.pitch_mm).powi(2),
-            height_cost: FLANKS * (measure.unit_mm / measure.stepover_mm).powi(2),
         };
-        let mut sum = [0.0; 3];
         for i in 0..count {
             let (group, lane) = (i / EIGHT, i % EIGHT);
-            let w = weights[i];
-            let g = if i == 0 { 0.0 } else { exact[i] - exact[i - 1] };
             let to = &mut table.positions[group];
-            (to.low[lane], to.high[lane], to.exact[lane], to.w[lane]) = (low[i], high[i], exact[i], w);
-            for (k, term) in [w, w * g, w * g * g].into_iter().enumerate() {
-                sum[k] += term;
-                to.sums[k][lane] = sum[k];
-            }
-            to.turn[lane] = off[i][1];
-            let first = (ends[i][0] - off[i][0]).ceil();
-            let states = ((ends[i][1] - off[i][0]).floor() - first).max(0.0) as usize + 1;
-            while table.layers.len() < states {
-                let none = Points { z: [0.0; EIGHT], cost: [ABSENT; EIGHT], from: [0; EIGHT] };
-                table.layers.push(vec![none; groups]);
-            }
-            for (nth, layer) in table.layers[..states].iter_mut().enumerate() {
-                layer[group].z[lane] = first + nth as f64 + off[i][0];
-                layer[group].cost[lane] = if i == 0 { 0.0 } else { f64::INFINITY };
+            (to.low[lane], to.high[lane]) = (low[i], high[i]);
+            let (first, states) = reach(i);
+            for (nth, points) in table.points[group * layers..][..states].iter_mut().enumerate() {
+                points.z[lane] = first + nth as f64 + off[i][0];
+                points.cost[lane] = if i == 0 { 0.0 } else { f64::INFINITY };
             }
         }
         table
@@ -140,8 +127,8 @@ impl Table {
     #[inline(always)]
     fn fill_with<E: Eight>(&mut self) {
         for i in 0..self.count.saturating_sub(1) {
-            for nth in 0..self.layers.len() {
-                if self.layers[nth][i / EIGHT].cost[i % EIGHT].is_finite() {
+            for nth in 0..self.layers {
+                if self.points[i / EIGHT * self.layers + nth].cost[i % EIGHT].is_finite() {
                     self.moves_from::<E>(i, nth);
                 }
             }
@@ -151,79 +138,77 @@ impl Table {
     /// Tries every move that begins at a point.
     #[inline(always)]
     fn moves_from<E: Eight>(&mut self, i: usize, nth: usize) {
-        let from = (i * self.layers.len() + nth) as u32;
+        let layers = self.layers;
+        let from = (i * layers + nth) as u32;
         let (group, lane) = (i / EIGHT, i % EIGHT);
-        let origin = &self.layers[nth][group];
-        let z = E::splat(origin.z[lane] + self.positions[group].turn[lane]);
-        // No move from here costs less than this.
-        let at_least = E::splat(origin.cost[lane] + self.block);
-        let [sum_w, sum_wg, sum_wg2] = self.positions[group].sums;
-        let before = [E::splat(sum_w[lane]), E::splat(sum_wg[lane]), E::splat(sum_wg2[lane])];
-        let (slope_cost, height_cost) = (E::splat(self.slope_cost), E::splat(self.height_cost));
-        let (zero, eight) = (E::splat(0.0), E::splat(EIGHT as f64));
+        let origin = &self.points[group * layers + nth];
+        let z = origin.z[lane] + self.turns[i];
         let (none, all) = (E::splat(f64::NEG_INFINITY), E::splat(f64::INFINITY));
         let (mut least, mut most) = (none, all);
-        // Over the positions passed, d away and q above the point: w d^2, w d q, w q^2.
-        let mut behind = [zero; 3];
+        // A, B and C of what the move has cost before the span, less what stands in the span's sums before it.
+        let mut before = [0.0, 0.0, origin.cost[lane] + self.block];
         // The first group may hold the point itself and some before it.
-        let start = (i + 1) / EIGHT;
+        let mut start = (i + 1) / EIGHT;
         let mut later = u8::MAX << ((i + 1) % EIGHT);
-        let mut d = E::add(
-            E::load(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]),
-            E::splat((start * EIGHT) as f64 - i as f64),
-        );
-        let parts = &self.part[(start + 1) * EIGHT - i..];
-        let groups = self.positions[start..].iter().zip(parts.chunks_exact(EIGHT)).enumerate();
-        for (k, (positions, part)) in groups {
-            let Some(part) = part.first_chunk::<EIGHT>() else { return };
-            let part = E::load(part);
-            let w = E::choose(later, E::load(&positions.w), zero);
-            let q = E::subtract(E::load(&positions.exact), z);
-            let (wd, wq) = (E::multiply(w, d), E::multiply(w, q));
-            let wd2 = E::add(sums::<E>(E::multiply(wd, d)), behind[0]);
-            let wdq = E::add(sums::<E>(E::multiply(wd, q)), behind[1]);
-            let wq2 = E::add(sums::<E>(E::multiply(wq, q)), behind[2]);
-            let [w, wg, wg2] = &positions.sums;
-            let w = E::subtract(E::load(w), before[0]);
-            let wg = E::subtract(E::load(wg), before[1]);
-            let wg2 = E::subtract(E::load(wg2), before[2]);
-            let low = E::multiply(E::subtract(E::load(&positions.low), z), part);
-            let high = E::multiply(E::subtract(E::load(&positions.high), z), part);
-            let (low, high) = (E::choose(later, low, none), E::choose(later, high, all));
-            let (low, high) = (E::greater(greatest::<E>(low), least), E::less(least_of::<E>(high), most));
-            // The bounds of the positions before each.
-            let (over, under) = (E::after(low, least), E::after(high, most));
-            for layer in &mut self.layers {
-                let points = &mut layer[start + k];
-                let old = E::load(&points.cost);
-                let open = later & E::is_less(at_least, old);
-                if open == 0 {
-                    continue;
-                }
-                let s = E::multiply(E::subtract(E::load(&points.z), z), part);
-                let meant = open & !E::is_less(s, over) & !E::is_less(under, s);
-                let turned = E::multiply(slope_cost, squares::<E>(s, w, wg, wg2));
-                let raised = E::multiply(height_cost, squares::<E>(s, wd2, wdq, wq2));
-                let new = E::add(E::add(at_least, turned), raised);
-                let better = meant & E::is_less(new, old);
-                E::store(E::choose(better, new, old), &mut points.cost);
-                E::mark(&mut points.from, better, from);
-            }
-            (least, most) = (E::last(low), E::last(high));
-            if E::is_less(most, least) != 0 {
-                break;
-            }
-            behind = [E::last(wd2), E::last(wdq), E::last(wq2)];
-            d = E::add(d, eight);
-            later = u8::MAX;
+        if group / SPAN == start / SPAN {
+            let [x, e] = self.seen_from(group / SPAN, i, z).map(E::splat);
+            let passed = self.sums[group].through::<E>(x, e).map(|sum| E::lane(sum, lane));
+            before = std::array::from_fn(|k| before[k] - passed[k]);
         }
+        let height = E::splat(z);
+        while start < self.positions.len() {
+            let span = start / SPAN;
+            let end = ((span + 1) * SPAN).min(self.positions.len());
+            let [x, e] = self.seen_from(span, i, z).map(E::splat);
+            let spent = before.map(E::splat);
+            let mut cost = spent;
+            let parts = self.part[(start + 1) * EIGHT - i..].chunks_exact(EIGHT);
+            for (group, part) in (start..end).zip(parts) {
+                let Some(part) = part.first_chunk::<EIGHT>() else { return };
+                let part = E::load(part);
+                let Positions { low, high } = &self.positions[group];
+                let mut low = E::multiply(E::subtract(E::load(low), height), part);
+                let mut high = E::multiply(E::subtract(E::load(high), height), part);
+                if later != u8::MAX {
+                    (low, high) = (E::choose(later, low, none), E::choose(later, high, all));
+                }
+                let (low, high) = (E::greater(greatest::<E>(low), least), E::less(least_of::<E>(high), most));
+                // The bounds of the positions before each.
+                let (over, under) = (E::after(low, least), E::after(high, most));
+                let [a, b, c] = self.sums[group].through::<E>(x, e);
+                cost = [E::add(a, spent[0]), E::add(b, spent[1]), E::add(c, spent[2])];
+                for points in &mut self.points[group * layers..][..layers] {
+                    let old = E::load(&points.cost);
+                    let s = E::multiply(E::subtract(E::load(&points.z), height), part);
+                    let [a, b, c] = cost;
+                    let new = E::add(E::multiply(E::subtract(E::multiply(a, s), b), s), c);
+                    let better = E::is_less(E::within(later, over, s, under), new, old);
+                    E::store(E::choose(better, new, old), &mut points.cost);
+                    E::mark(&mut points.from, better, from);
+                }
+                (least, most) = (E::last(low), E::last(high));
+                if E::is_less(u8::MAX, most, least) != 0 {
+                    return;
+                }
+                later = u8::MAX;
+            }
+            before = cost.map(|sum| E::lane(sum, EIGHT - 1));
+            start = end;
+        }
+    }
+
+    /// Place and height of a point as a span's sums count them.
+    #[inline(always)]
+    fn seen_from(&self, span: usize, i: usize, z: f64) -> [f64; 2] {
+        let first = span * SPAN * EIGHT;
+        [i as f64 - first as f64, z - self.exact[first]]
     }
 
     /// The way to the cheapest point of the last position: whole units, `off` taken away again.
     pub(super) fn best(&self, off: &[[f64; 2]]) -> Vec<Vertex> {
-        let layers = self.layers.len();
+        let layers = self.layers;
         let last = self.count - 1;
-        let at = |nth: usize, i: usize| (&self.layers[nth][i / EIGHT], i % EIGHT);
+        let at = |nth: usize, i: usize| (&self.points[i / EIGHT * layers + nth], i % EIGHT);
         let cost = |nth: usize| {
             let (points, lane) = at(nth, last);
             points.cost[lane]
@@ -246,22 +231,6 @@ impl Table {
     }
 }
 
-/// s^2 a - 2 s b + c, which is a sum of squares.
-#[inline(always)]
-fn squares<E: Eight>(s: E::Group, a: E::Group, b: E::Group, c: E::Group) -> E::Group {
-    let falls = E::multiply(E::add(s, s), b);
-    E::greater(E::add(E::subtract(E::multiply(E::multiply(s, s), a), falls), c), E::splat(0.0))
-}
-
-/// Of each lane and all before it.
-#[inline(always)]
-fn sums<E: Eight>(a: E::Group) -> E::Group {
-    let nothing = E::splat(0.0);
-    let a = E::add(a, E::after(a, nothing));
-    let a = E::add(a, E::after2(a, nothing));
-    E::add(a, E::after4(a, nothing))
-}
-
 #[inline(always)]
 fn greatest<E: Eight>(a: E::Group) -> E::Group {
     let nothing = E::splat(f64::NEG_INFINITY);
@@ -280,6 +249,7 @@ fn least_of<E: Eight>(a: E::Group) -> E::Group {
 
 #[cfg(test)]
 mod tests {
+    use super::super::ends::tests::cost;
     use super::*;
     use proptest::prelude::*;
 
@@ -289,9 +259,9 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn every_instruction_set_gives_the_same_bits(
+        fn costs_are_as_defined_and_the_same_bits_on_every_instruction_set(
             slopes in proptest::collection::vec(-0.6..0.6f64, 1..12),
-            length in 1usize..40,
+            length in 1usize..80,
         ) {
             let facets = slopes.iter().flat_map(|slope| std::iter::repeat_n(*slope, length));
             let exact: Vec<f64> = facets.scan(0.4, |z, slope| { *z += slope; Some(*z) }).collect();
@@ -304,10 +274,16 @@ mod tests {
             widest.fill();
             let mut portable = Table::new(&bounds, &exact, &MEASURE);
             portable.fill_with::<Portable>();
-            for (a, b) in widest.layers.iter().flatten().zip(portable.layers.iter().flatten()) {
+            for (a, b) in widest.points.iter().zip(&portable.points) {
                 prop_assert!(a.cost.iter().zip(&b.cost).all(|(a, b)| a.to_bits() == b.to_bits()));
             }
-            prop_assert_eq!(widest.best(&off), portable.best(&off));
+            let best = widest.best(&off);
+            prop_assert_eq!(&best, &portable.best(&off));
+            let last = widest.count - 1;
+            let costs = widest.points[last / EIGHT * widest.layers..].iter().map(|points| points.cost[last % EIGHT]);
+            let least = costs.filter(|cost| *cost != ABSENT).fold(f64::INFINITY, f64::min) * MEASURE.pitch_mm;
+            let by_definition = cost(&best, &exact, &MEASURE);
+            prop_assert!((least - by_definition).abs() < 1e-10, "{} and {}", least, by_definition);
         }
     }
 }
