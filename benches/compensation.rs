@@ -7,7 +7,7 @@
 mod surfaces;
 
 use npyz::WriterBuilder;
-use screenmill::compensation::{self, Profile, RowTarget, Way};
+use screenmill::compensation::{self, Closings, Profile, RowTarget, Tables, Way};
 use screenmill::grid::{Heights, Window};
 use std::hint::black_box;
 use std::path::Path;
@@ -132,16 +132,18 @@ fn main() {
     let (mut naive, mut known) = (Vec::new(), Vec::new());
     let mut done = Heights { window, z_mm: Vec::new() };
     let mut rows = done.clone();
+    let mut closings = Closings::new();
     for radius in RADII {
         let profile = ball(radius);
         let per_sample =
             |runs: usize, run: &dyn Fn() -> Heights| nanoseconds(runs, || drop(black_box(run()))) / samples;
-        // In memory that is there, as a copy is.
+        // Locations, rows and closings in memory that is there, as a copy is: the first of four runs takes it.
         let run = || compensation::cutter_location_rows_into(&h, &profile, window, 1, &mut done);
         cl.push(nanoseconds(4, run) / samples);
         let run = || compensation::cutter_location_rows_into(&h, &profile, window, 5, &mut rows);
         fifth.push(nanoseconds(4, run) / samples);
-        closing.push(per_sample(2, &|| compensation::closing(&h, &profile, window)));
+        let run = || _ = black_box(closings.of(&h, &Tables::new(profile), window));
+        closing.push(nanoseconds(4, run) / samples);
         naive.push(naive_ns_per_sample(&h, &profile));
         let disc = cutter(&format!("flat:{}", 2.0 * radius as f64 * STEP_MM));
         flat.push(per_sample(1, &|| compensation::cutter_location(&h, &disc, window)));

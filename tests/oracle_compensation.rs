@@ -9,7 +9,7 @@ mod surfaces;
 
 use naive::Cutter;
 use rayon::prelude::*;
-use screenmill::compensation::{self as fast, Profile, RowPass, RowTarget};
+use screenmill::compensation::{self as fast, Closings, Profile, RowPass, RowTarget, Tables};
 use screenmill::grid::{Heights, Window};
 use surfaces::STEP_MM;
 
@@ -104,6 +104,22 @@ fn closing_is_the_erosion_of_positions_past_the_edges() {
             }
         }
     });
+}
+
+#[test]
+fn closings_in_memory_of_others_are_the_same() {
+    let mut closings = Closings::new();
+    let surfaces = surfaces::all(60);
+    // Larger and smaller windows in turn, with holes and without, off the surface and on it.
+    for (k, (name, h)) in surfaces.iter().enumerate() {
+        for text in ["ball:0.3", "flat:0.3", "bull:0.4:0.1"] {
+            let (profile, _) = cutter(text, 0.0);
+            let out = if k % 2 == 0 { h.window } else { Window { row: 41, rows: 13, ..reaching_past(h) } };
+            let got = closings.of(h, &Tables::new(profile), out);
+            assert_eq!(got.window, out);
+            same(&format!("{text} closing {name}"), &got.z_mm, &fast::closing(h, &profile, out).z_mm);
+        }
+    }
 }
 
 #[test]

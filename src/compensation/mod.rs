@@ -22,6 +22,7 @@ mod boxes;
 mod brute;
 mod bundle;
 mod chord;
+mod closing;
 mod cones;
 mod contact;
 mod drop;
@@ -53,6 +54,7 @@ mod touch;
 mod unboxed;
 mod weld;
 
+pub use closing::{Closings, closing, residual};
 pub use drop::{Faces, lift};
 pub use facets::Facets;
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows, rows_by};
@@ -62,9 +64,7 @@ pub use stream::{Band, stream, stream_bytes};
 pub use tables::Tables;
 #[doc(hidden)]
 pub use tiles::{Way, cutter_location_by};
-pub use tiles::{
-    closing, closing_by, cutter_location, cutter_location_rows, cutter_location_rows_into, erode, residual,
-};
+pub use tiles::{cutter_location, cutter_location_rows, cutter_location_rows_into, erode};
 
 /// Why a compensation was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,7 +1,7 @@
+use super::closing::left;
 use super::field::Sense;
 use super::memory::untouched;
 use super::strips::{AHEAD, Strips, in_strips, strip_bytes};
-use super::tiles::left;
 use super::{Profile, RowPass, Tables, machined_by_rows};
 use crate::grid::{Heights, Lattice, Window};
 use rayon::prelude::*;

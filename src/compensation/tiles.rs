@@ -70,49 +70,13 @@ pub fn erode(cl: &Heights, profile: &Profile, out: Window) -> Heights {
     on_samples(cl, &Tables::new(*profile), out, 1, Sense::Lower, Way::Known)
 }
 
-/// What the cutter leaves of `h` at best. Cutter positions are the samples of `out` grown by
-/// [`Profile::reach`], whether `h` has data there or not, so `h` should cover `out` grown by
-/// twice that as far as there is data.
-pub fn closing(h: &Heights, profile: &Profile, out: Window) -> Heights {
-    closing_by(h, &Tables::new(*profile), out)
-}
-
-/// [`closing`] with tables that last longer than a call.
-pub fn closing_by(h: &Heights, tables: &Tables, out: Window) -> Heights {
-    let around = out.grown(tables.profile().reach());
-    let cl = on_samples(h, tables, around, 1, Sense::Raise, Way::Known);
-    on_samples(&cl, tables, out, 1, Sense::Lower, Way::Known)
-}
-
-/// closing - h, never negative: rounding may put a closing one unit in the last place low. NaN
-/// where either has no data. Both have the window of `closing`.
-pub fn residual(closing: &Heights, h: &Heights) -> Heights {
-    let cropped;
-    let h = if h.window == closing.window {
-        h
-    } else {
-        cropped = h.crop(closing.window);
-        &cropped
-    };
-    let z_mm = closing.z_mm.iter().zip(&h.z_mm).map(|(c, h)| left(*c, *h)).collect();
-    Heights { window: closing.window, z_mm }
-}
-
-/// What a closing leaves on a sample.
-#[inline(always)]
-pub(super) fn left(closing_mm: f32, h_mm: f32) -> f32 {
-    let left_mm = closing_mm - h_mm;
-    // Not below zero, and NaN where either is none.
-    if left_mm < 0.0 { 0.0 } else { left_mm }
-}
-
 fn on_samples(h: &Heights, tables: &Tables, out: Window, every: usize, sense: Sense, way: Way) -> Heights {
     let mut done = Heights { window: out, z_mm: Vec::new() };
     on_samples_into(h, tables, out, every, sense, way, &mut done);
     done
 }
 
-fn on_samples_into(
+pub(super) fn on_samples_into(
     h: &Heights,
     tables: &Tables,
     out: Window,

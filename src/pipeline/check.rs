@@ -15,7 +15,7 @@ use super::plan::TileSetup;
 use super::share::standard_error;
 use super::shop::Shop;
 use super::{Error, WITHIN, maps};
-use crate::compensation::{self, Tables};
+use crate::compensation::{self, Closings, Tables};
 use crate::fidelity::light::{LightTally, View};
 use crate::grid::Heights;
 use crate::job::Job;
@@ -357,10 +357,11 @@ impl Facts<'_> {
             for row in blocks(&lattice) {
                 let done: Vec<(Heights, Heights)> = row
                     .par_iter()
-                    .map(|&window| {
+                    .map_init(Closings::new, |closings, &window| {
                         let around = surface.heights(window.grown(2 * reach), surface.top_mm())?;
                         let design = around.crop(window);
-                        let cavity = compensation::residual(&self.closing(&around, set, window), &design);
+                        let closing = self.closing(closings, &around, set, window);
+                        let cavity = compensation::residual(&closing, &design);
                         progress.advance(window.samples() as u64);
                         Ok((design, cavity))
                     })

@@ -12,7 +12,7 @@ use super::shop::Shop;
 use super::tabs::{self, Slot};
 use super::underside::{self, Thin};
 use super::{Error, light, report};
-use crate::compensation::Profile;
+use crate::compensation::{Profile, Tables};
 use crate::cutter::Shape;
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{self, Pixels, Tally};
@@ -206,6 +206,7 @@ fn judged(
         })
         .collect();
     let cutters = distinct(reaching(shop).into_iter(), step_mm)?;
+    let cutters: Vec<Tables> = cutters.into_iter().map(Tables::new).collect();
     let (names, candidates) = candidates(shop, step_mm)?;
     let steepest = part.whole.steepest();
     let sight = match (part.pose(job, &tile.piece), &part.scene) {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::Error;
 use super::light::{self, Sight};
-use crate::compensation::{self, Profile, RowPass, RowTarget};
+use crate::compensation::{self, Closings, Profile, RowPass, RowTarget, Tables};
 use crate::fidelity::cavities::{self, Labelled};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{self, Cavities, Found, Layers, Peaks, Pixels, Tally, polish};
@@ -34,7 +34,7 @@ pub struct Case<'a> {
     /// The programs of each post in run order.
     pub posts: &'a [Vec<Judged<'a>>],
     /// Every cutter of the job once.
-    pub cutters: &'a [Profile],
+    pub cutters: &'a [Tables],
     pub passes: &'a [ExactPasses],
     pub tally: fidelity::Params,
     pub cavities: cavities::Params,
@@ -254,7 +254,7 @@ impl Case<'_> {
     fn block(&self, window: Window, pictures: &Pictures) -> Result<Block, Error> {
         let datum_mm = self.surface.top_mm();
         let lattice = self.surface.lattice();
-        let reach = self.cutters.iter().map(Profile::reach).max().unwrap_or(0);
+        let reach = self.cutters.iter().map(|tables| tables.profile().reach()).max().unwrap_or(0);
         // Normals need one sample around the block, rays more.
         let pad = self.polish_mm.map_or(0, |_| polish::reach(lattice.step_mm));
         let halo = if self.sight.is_some() { light::halo(lattice.step_mm) + pad } else { 1 };
@@ -351,16 +351,17 @@ impl Case<'_> {
     /// Minimum over the cutters of the closing, less the design. The smallest cutter is closed with everywhere,
     /// others where they could get lower.
     fn cavity(&self, around: &Heights, design: &Heights) -> Heights {
-        let mut cutters: Vec<&Profile> = self.cutters.iter().collect();
-        cutters.sort_by(|a, b| a.radius_mm().total_cmp(&b.radius_mm()));
+        let mut cutters: Vec<&Tables> = self.cutters.iter().collect();
+        cutters.sort_by(|a, b| a.profile().radius_mm().total_cmp(&b.profile().radius_mm()));
         let Some((smallest, others)) = cutters.split_first() else { return Heights::empty(design.window) };
-        let mut lowest = compensation::closing(around, smallest, design.window);
+        let mut closings = Closings::new();
+        let mut lowest = closings.of(around, smallest, design.window).clone();
         let mut peaks = None;
-        for profile in others {
+        for tables in others {
             let peaks = peaks.get_or_insert_with(|| Peaks::of(around));
             let step_mm = self.surface.lattice().step_mm;
-            for within in peaks.lower_within(&profile.shape(), step_mm, &lowest, design) {
-                lower(&mut lowest, &compensation::closing(around, profile, within));
+            for within in peaks.lower_within(&tables.profile().shape(), step_mm, &lowest, design) {
+                lower(&mut lowest, closings.of(around, tables, within));
             }
         }
         compensation::residual(&lowest, design)

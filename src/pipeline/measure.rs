@@ -8,7 +8,7 @@ use super::judge::blocks_of;
 use super::light::{self, Sight};
 use super::plan::TileSetup;
 use super::share::squares;
-use crate::compensation;
+use crate::compensation::{self, Closings};
 use crate::fidelity::light::{Known, LightTally};
 use crate::fidelity::{self, Layers, Tally};
 use crate::grid::{Heights, Window};
@@ -156,8 +156,9 @@ impl Facts<'_> {
         let known = room.as_ref().map(|(pose, room)| Known::new(&design, window, step_mm, pose, room));
         let mut reached = vec![0u16; near.samples()];
         let mut measured = Vec::new();
+        let mut closings = Closings::new();
         for (bit, set) in sets.iter().enumerate() {
-            let mut closing = self.closing(&around, set, near);
+            let mut closing = self.closing(&mut closings, &around, set, near);
             for ((mask, closed), z) in reached.iter_mut().zip(&mut closing.z_mm).zip(&design.z_mm) {
                 *mask |= u16::from(*closed - z <= limit_mm) << bit;
                 if z.is_nan() {
@@ -186,10 +187,17 @@ impl Facts<'_> {
         Ok((measured, counts, designed))
     }
 
-    pub(super) fn closing(&self, around: &Heights, set: &[usize], out: Window) -> Heights {
+    /// The lowest of what a set's cutters leave.
+    pub(super) fn closing(
+        &self,
+        closings: &mut Closings,
+        around: &Heights,
+        set: &[usize],
+        out: Window,
+    ) -> Heights {
         let mut lowest = Heights::empty(out);
         for &index in set {
-            let closing = compensation::closing_by(around, &self.candidates[index].tables, out);
+            let closing = closings.of(around, &self.candidates[index].tables, out);
             for (z, other) in lowest.z_mm.iter_mut().zip(&closing.z_mm) {
                 *z = z.min(*other);
             }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::passes::Layout;
 use super::{Error, Progress};
-use crate::compensation::{self, Profile};
+use crate::compensation::{self, Closings, Profile, Tables};
 use crate::grid::Window;
 use crate::surface::Surface;
 
@@ -110,19 +110,19 @@ fn left(
     let reach = before.iter().map(Profile::reach).max().unwrap_or(0);
     let starts: Vec<usize> = (0..lattice.rows).step_by(BLOCK).collect();
     let mut rows: Vec<Vec<[usize; 2]>> = vec![Vec::new(); lattice.rows];
+    let tables: Vec<Tables> = before.iter().map(|profile| Tables::new(*profile)).collect();
     for &row in &starts {
         let height = BLOCK.min(lattice.rows - row);
         let columns: Vec<usize> = (0..lattice.columns).step_by(BLOCK).collect();
         let blocks: Vec<Vec<Vec<[usize; 2]>>> = columns
             .par_iter()
-            .map(|&column| {
+            .map_init(Closings::new, |closings, &column| {
                 let width = BLOCK.min(lattice.columns - column);
                 let window = Window { column: column as i64, row: row as i64, columns: width, rows: height };
                 let around = surface.heights(window.grown(2 * reach), surface.top_mm())?;
                 let mut over = vec![true; window.samples()];
-                for profile in before {
-                    let closing = compensation::closing(&around, profile, window);
-                    let left = compensation::residual(&closing, &around);
+                for tables in &tables {
+                    let left = compensation::residual(closings.of(&around, tables, window), &around);
                     // False for no data, too.
                     over.iter_mut().zip(&left.z_mm).for_each(|(over, &z)| *over &= f64::from(z) > over_mm);
                 }
