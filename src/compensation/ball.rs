@@ -24,6 +24,13 @@ impl Reachable {
         (self.y[1] - self.y[0] + 0.5) * (1.0 + (self.x[1] - self.x[0]) / LANES as f64)
     }
 
+    /// What lies in both.
+    #[inline(always)]
+    pub fn and(&self, other: &Reachable) -> Reachable {
+        let both = |a: [f64; 2], b: [f64; 2]| [greater(a[0], b[0]), less(a[1], b[1])];
+        Reachable { x: both(self.x, other.x), y: both(self.y, other.y) }
+    }
+
     #[inline(always)]
     fn is_empty(&self) -> bool {
         self.x[0] > self.x[1] || self.y[0] > self.y[1]
@@ -76,16 +83,39 @@ impl Ball {
     #[inline(always)]
     pub fn reachable(&self, rises: &Rises) -> Option<Reachable> {
         let slopes = self.slopes(rises, 1.0);
-        let mut at = self.start_of(&slopes);
+        self.narrowed(self.start_of(&slopes), &slopes)
+    }
+
+    /// As [`Ball::reachable`], of offsets within a box only.
+    #[inline(always)]
+    pub fn reachable_within(&self, rises: &Rises, within: &Reachable) -> Option<Reachable> {
+        let slopes = self.slopes(rises, 1.0);
+        let at = self.start_of(&slopes).and(within);
+        if at.is_empty() { None } else { self.narrowed(at, &slopes) }
+    }
+
+    #[inline(always)]
+    fn narrowed(&self, mut at: Reachable, slopes: &Slopes) -> Option<Reachable> {
         for _ in 0..6 {
             let before = at.lattice_points();
-            at = self.sweep(at, &slopes)?;
+            at = self.sweep(at, slopes)?;
             let now = at.lattice_points();
             if now <= 2.6 || now > 0.9 * before {
                 break;
             }
         }
         Some(at)
+    }
+
+    /// What of a box lies under the ball, or more.
+    #[inline(always)]
+    pub fn under(&self, at: &Reachable) -> Reachable {
+        let half = |[low, high]: [f64; 2]| {
+            let near = greater(greater(low, -high), 0.0);
+            greater(self.radius * self.radius - near * near, 0.0).sqrt() + ROOM
+        };
+        let (x, y) = (half(at.y), half(at.x));
+        at.and(&Reachable { x: [-x, x], y: [-y, y] })
     }
 
     /// A box for samples with these rises without sweeps: wide, and never empty.

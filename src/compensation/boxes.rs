@@ -148,6 +148,24 @@ impl<V: Vectors> Boxes<V> {
         within
     }
 
+    /// The samples whose boxes have anything in common with `with`.
+    #[inline(always)]
+    pub fn overlapping(&self, with: &Reachable) -> [u16; ROWS] {
+        let (x_low, x_high) = (V::splat(with.x[0] as f32), V::splat(with.x[1] as f32));
+        let (y_low, y_high) = (V::splat(with.y[0] as f32), V::splat(with.y[1] as f32));
+        let mut these = [0; ROWS];
+        for (r, these) in these.iter_mut().enumerate() {
+            if self.boxed[r] != 0 {
+                *these = self.boxed[r]
+                    & V::at_least(x_high, V::load(&self.x_low[r]))
+                    & V::at_least(V::load(&self.x_high[r]), x_low)
+                    & V::at_least(y_high, V::load(&self.y_low[r]))
+                    & V::at_least(V::load(&self.y_high[r]), y_low);
+            }
+        }
+        these
+    }
+
     /// The box around those of some samples.
     #[inline(always)]
     pub fn hull(&self, of: &[u16; ROWS]) -> Reachable {

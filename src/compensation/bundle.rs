@@ -64,13 +64,10 @@ impl<V: Vectors> Work<V> for Raise<'_, '_> {
         }
         let groups = ((end - start) as usize).div_ceil(LANES);
         let shortest = on.stencil.arc_there(if -y[0] > y[1] { y[0] } else { y[1] }).arc;
-        if groups > MOST_GROUPS
-            || (y[1] - y[0]) as usize >= MOST_ROWS
-            || at.x[1] > shortest.hi + PAST_RIM
-            || at.x[0] < shortest.lo - PAST_RIM
-        {
+        if groups > MOST_GROUPS || (y[1] - y[0]) as usize >= MOST_ROWS {
             return false;
         }
+        let is_padded = at.x[1] <= shortest.hi + PAST_RIM && at.x[0] >= shortest.lo - PAST_RIM;
         let mut bundle = Bundle {
             a: block.a,
             row: (on.input_row + block.a - on.target_row) as i32,
@@ -78,9 +75,19 @@ impl<V: Vectors> Work<V> for Raise<'_, '_> {
             at: Offsets { x: at.x, y },
             ends: [0; ROWS + 1],
             samples: [(0.0, 0, 0); ROWS * LANES],
-            bases: [0; MOST_ROWS],
+            cuts: [Cut { base: 0, lo: 1, hi: 0 }; MOST_ROWS],
         };
-        let by_sample = sum <= full * (at.x[1] - at.x[0] + 1) as u32;
+        for (cut, dy) in bundle.cuts.iter_mut().zip(y[0]..=y[1]) {
+            let arc = on.stencil.arc_there(dy);
+            let base = arc.index(0) as i32;
+            *cut = if is_padded {
+                // All alike, for the processor foretells how often a loop is gone through.
+                Cut { base, lo: at.x[0], hi: at.x[1] }
+            } else {
+                Cut { base, lo: at.x[0].max(arc.arc.lo), hi: at.x[1].min(arc.arc.hi) }
+            };
+        }
+        let by_sample = is_padded && sum <= full * (at.x[1] - at.x[0] + 1) as u32;
         let mut count = 0;
         for (r, &bits) in bits.iter().enumerate().take(block.rows) {
             if bits != 0 {
@@ -99,11 +106,6 @@ impl<V: Vectors> Work<V> for Raise<'_, '_> {
                 }
             }
             bundle.ends[r + 1] = count;
-        }
-        if by_sample {
-            for (base, dy) in bundle.bases.iter_mut().zip(y[0]..=y[1]) {
-                *base = on.stencil.arc_there(dy).index(0) as i32;
-            }
         }
         let (mut start, mut left) = (start as usize, groups);
         while left > 0 {
@@ -135,14 +137,24 @@ struct Bundle {
     ends: [usize; ROWS + 1],
     /// Height, target column at dx = 0 and row.
     samples: [(f32, i32, i32); ROWS * LANES],
-    /// Where s(0) of each row of the box would stand in the stencil's values.
-    bases: [i32; MOST_ROWS],
+    /// The cutter in each row of the box.
+    cuts: [Cut; MOST_ROWS],
+}
+
+/// One row of a box.
+#[derive(Clone, Copy)]
+struct Cut {
+    /// Where s(0) would stand in the stencil's values.
+    base: i32,
+    /// Offsets along the row.
+    lo: i32,
+    hi: i32,
 }
 
 impl Bundle {
     /// The target rows that it may raise.
     #[inline(always)]
-    fn targets(&self, every: i32, rows: usize) -> std::ops::Range<i32> {
+    fn target_rows(&self, every: i32, rows: usize) -> std::ops::Range<i32> {
         let first = self.row + self.rows[0] as i32 - self.at.y[1];
         let last = self.row + self.rows[1] as i32 - self.at.y[0];
         if every == 1 {
@@ -160,14 +172,19 @@ impl Bundle {
         [(low - level).max(self.rows[0] as i32), (high - level).min(self.rows[1] as i32)]
     }
 
+    /// Each target row with the groups from `start` on, and the rows of the bundle that may raise it.
     #[inline(always)]
-    fn by_samples<V: Vectors, const GROUPS: usize>(&self, on: &OnSamples, start: usize, out: &mut Targets) {
-        let every = on.every as i32;
-        let values = on.stencil.values();
-        for b in self.targets(every, out.rows) {
+    fn targets<V: Vectors, const GROUPS: usize>(
+        &self,
+        every: i32,
+        start: usize,
+        out: &mut Targets,
+        raise: impl Fn(&mut [V::Group; GROUPS], i32, [i32; 2]),
+    ) {
+        for b in self.target_rows(every, out.rows) {
             let level = self.row - b * every;
-            let [from, to] = self.rows_at(level);
-            if from > to {
+            let rows = self.rows_at(level);
+            if rows[0] > rows[1] {
                 continue;
             }
             let line = groups_mut(&mut out.row_mut(b as usize)[start..][..GROUPS * LANES]);
@@ -175,20 +192,27 @@ impl Bundle {
             for (best, line) in best.iter_mut().zip(line.iter()) {
                 *best = V::load(line);
             }
-            let skip = level - self.at.y[0];
+            raise(&mut best, level - self.at.y[0], rows);
+            for (best, line) in best.into_iter().zip(line) {
+                V::store(best, line);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn by_samples<V: Vectors, const GROUPS: usize>(&self, on: &OnSamples, start: usize, out: &mut Targets) {
+        let values = on.stencil.values();
+        self.targets::<V, GROUPS>(on.every as i32, start, out, |best, skip, [from, to]| {
             let samples = &self.samples[self.ends[from as usize]..self.ends[to as usize + 1]];
             for &(z, column, r) in samples {
-                let base = self.bases[(skip + r) as usize & (MOST_ROWS - 1)];
+                let base = self.cuts[(skip + r) as usize & (MOST_ROWS - 1)].base;
                 let s = &values[(base - column + start as i32) as usize..][..GROUPS * LANES];
                 let z = V::splat(z);
                 for (best, s) in best.iter_mut().zip(groups(s)) {
                     *best = V::greater(V::add(V::load(s), z), *best);
                 }
             }
-            for (best, line) in best.into_iter().zip(line) {
-                V::store(best, line);
-            }
-        }
+        });
     }
 
     #[inline(always)]
@@ -199,29 +223,15 @@ impl Bundle {
         start: usize,
         out: &mut Targets,
     ) {
-        let every = on.every as i32;
+        let values = on.stencil.values();
         let from_column = PAD as i32 + start as i32 + on.shift as i32;
-        for b in self.targets(every, out.rows) {
-            let level = self.row - b * every;
-            let [from, to] = self.rows_at(level);
-            if from > to {
-                continue;
-            }
-            let line = groups_mut(&mut out.row_mut(b as usize)[start..][..GROUPS * LANES]);
-            let mut best = [V::splat(0.0); GROUPS];
-            for (best, line) in best.iter_mut().zip(line.iter()) {
-                *best = V::load(line);
-            }
+        self.targets::<V, GROUPS>(on.every as i32, start, out, |best, skip, [from, to]| {
             for r in from..=to {
-                if self.ends[r as usize] == self.ends[r as usize + 1] {
+                let Cut { base, lo, hi } = self.cuts[(skip + r) as usize & (MOST_ROWS - 1)];
+                if lo > hi || self.ends[r as usize] == self.ends[r as usize + 1] {
                     continue;
                 }
-                let arc = on.stencil.arc_there(level + r);
-                let (lo, hi) = (self.at.x[0].max(arc.arc.lo), self.at.x[1].min(arc.arc.hi));
-                if lo > hi {
-                    continue;
-                }
-                let s = &arc.values[arc.index(hi)..][..(hi - lo + 1) as usize];
+                let s = &values[(base - hi) as usize..][..(hi - lo + 1) as usize];
                 let row = &field.row(self.a + i64::from(r))[(from_column + lo) as usize..];
                 let row = &row[..GROUPS * LANES + s.len() - 1];
                 for (k, s) in s.iter().rev().enumerate() {
@@ -231,9 +241,6 @@ impl Bundle {
                     }
                 }
             }
-            for (best, line) in best.into_iter().zip(line) {
-                V::store(best, line);
-            }
-        }
+        });
     }
 }

@@ -64,6 +64,19 @@ pub(super) trait Touch<V: Vectors, P: Pairs> {
     /// Raises the targets by samples of the rows from `a` on that share offsets; gives what work it was.
     fn raise(&mut self, on: On<'_, P>, a: i64, spans: &[Span], at: &Self::At, out: &mut Targets) -> usize;
 
+    /// Raises the targets by a block that lies beside all of them; gives what work it was, and the samples that are
+    /// left. None, and nothing done, if it does not lie there.
+    fn beside(
+        &mut self,
+        _: &On<'_, P>,
+        _: Block,
+        _: &Rises,
+        _: &mut Lanes,
+        _: &mut Targets,
+    ) -> Option<(usize, [u16; ROWS])> {
+        None
+    }
+
     /// Raises the targets by samples of a block that share nothing.
     fn rest(
         &mut self,
@@ -278,7 +291,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 None => {
                     let Some((all, grain_mm)) = of_edge else { continue };
                     if self.in_reach(block, &all) {
-                        self.split(block, grain_mm, out);
+                        self.split(block, &all, grain_mm, out);
                         if self.work as f64 > self.most {
                             return;
                         }
@@ -336,11 +349,21 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
 
     /// A block of more than one facet.
     #[inline(always)]
-    fn split(&mut self, block: Block, grain_mm: f32, out: &mut Targets) {
+    fn split(&mut self, block: Block, all: &Rises, grain_mm: f32, out: &mut Targets) {
         self.work += ROW_WORK;
-        self.lanes.fill::<V>(self.field, block);
-        let mut left = self.lanes.data;
-        self.facets(block, grain_mm, &mut left, out);
+        let on = On { field: self.field, pairs: self.pairs };
+        let left = match self.touch.beside(&on, block, all, &mut self.lanes, out) {
+            Some((work, left)) => {
+                self.work += work;
+                left
+            }
+            None => {
+                self.lanes.fill::<V>(self.field, block);
+                let mut left = self.lanes.data;
+                self.facets(block, grain_mm, &mut left, out);
+                left
+            }
+        };
         if left != [0; ROWS] {
             let on = On { field: self.field, pairs: self.pairs };
             self.work += self.touch.rest(on, block, &self.lanes, &left, out);

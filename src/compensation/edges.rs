@@ -12,7 +12,7 @@ use super::runs::{BoxRows, Offsets, One, Run, raise_row};
 use super::slopes::Rises;
 
 /// Offsets of samples that are taken at once, at most, and what looking at them costs.
-const BUNDLED: usize = 600;
+pub(super) const BUNDLED: usize = 600;
 const BUNDLE_WORK: usize = 40;
 
 /// Samples of a block, at most, that are sorted by the side to which the surface drops off.

@@ -30,6 +30,7 @@ mod edges;
 mod facets;
 mod feed;
 mod field;
+mod flank;
 mod interval;
 mod lanes;
 mod listed;

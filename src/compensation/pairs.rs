@@ -1,3 +1,6 @@
+use super::ball::Reachable;
+use super::blocks::Block;
+use super::lanes::LANES;
 use super::stencil::{ArcRef, Stencil};
 use std::ops::Range;
 use std::sync::Arc;
@@ -60,6 +63,20 @@ impl OnSamples<'_> {
     #[inline(always)]
     fn target(&self, b: usize) -> i64 {
         self.target_row + b as i64 * self.every
+    }
+}
+
+impl OnSamples<'_> {
+    /// The offsets at which samples of a block reach targets of so many columns, if it lies beside all of them.
+    #[inline(always)]
+    pub fn within(&self, block: Block, columns: usize) -> Option<Reachable> {
+        let column = block.first as i64 - self.shift;
+        let row = self.input_row + block.a - self.target_row;
+        let (last_column, last_row) = (column + LANES as i64 - 1, row + block.rows as i64 - 1);
+        let (right, top) = (columns as i64 - 1, (self.target_rows as i64 - 1) * self.every);
+        let is_beside = last_column < 0 || column > right || last_row < 0 || row > top;
+        let range = |low: i64, high: i64| [low as f64, high as f64];
+        is_beside.then(|| Reachable { x: range(column - right, last_column), y: range(row - top, last_row) })
     }
 }
 

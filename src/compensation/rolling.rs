@@ -7,6 +7,7 @@ use super::bundle::raise_bundle;
 use super::contact::{BLOCK_WORK, MANY, On, ROW_WORK, Touch, count, spans_of};
 use super::edges::Edges;
 use super::field::{Field, PAD, Targets};
+use super::flank::Flank;
 use super::interval::Beside;
 use super::lanes::{LANES, Vectors};
 use super::pairs::{OnSamples, Pairs};
@@ -51,10 +52,10 @@ pub(super) struct Rolling<V: Vectors> {
     packed: Lanes,
     /// Where the packed samples come from: row and lane.
     from: [[u8; 2]; ROWS * LANES],
-    boxes: Boxes<V>,
+    pub(super) boxes: Boxes<V>,
     pub(super) row_bounds: RowBounds,
     /// Whether all offsets are whole samples.
-    whole: bool,
+    pub(super) whole: bool,
 }
 
 impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
@@ -85,6 +86,20 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
     #[inline(always)]
     fn raise(&mut self, on: On<'_, P>, a: i64, spans: &[Span], at: &Reachable, out: &mut Targets) -> usize {
         raise::<V, P>(&on, a, spans, at, out)
+    }
+
+    #[inline(always)]
+    fn beside(
+        &mut self,
+        on: &On<'_, P>,
+        block: Block,
+        rises: &Rises,
+        lanes: &mut Lanes,
+        out: &mut Targets,
+    ) -> Option<(usize, [u16; ROWS])> {
+        let (field, on) = (on.field, on.pairs.on_samples()?);
+        let within = on.within(block, out.columns)?;
+        Some(V::apart(Flank { rolling: self, field, on, block, rises, within, lanes, out }))
     }
 
     #[inline(always)]
