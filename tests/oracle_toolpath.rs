@@ -1,7 +1,9 @@
 //! Planned paths against a sweep by brute force: never a gouge, nothing left that need not be.
 
+mod curves;
 mod relief;
 
+use curves::strays;
 use proptest::prelude::*;
 use relief::{Relief, Stock, assert_rules, site};
 use screenmill::grid::{Heights, Lattice, Window};
@@ -426,6 +428,47 @@ fn facets() -> impl Strategy<Value = (Vec<[f64; 3]>, bool)> {
     (proptest::collection::vec(plane, 1..7), any::<bool>())
 }
 
+fn facetted(planes: &[[f64; 3]], bumps: bool, jump: f64) -> Relief {
+    let steepest = [0, 1].map(|k| planes.iter().map(|p| p[k].abs()).fold(0.0, f64::max));
+    Relief::new([0.36, 0.28], STEP, steepest, |x, y| {
+        let all = planes.iter().map(|p| p[0] * (x - 0.18) + p[1] * (y - 0.14) + p[2]);
+        let z = if bumps { all.fold(f64::INFINITY, f64::min) } else { all.fold(f64::NEG_INFINITY, f64::max) };
+        if x + 0.3 * y > 0.21 { z + jump } else { z }
+    })
+}
+
+/// Paths of one finish on several grids: the farthest that one of the finer is from the coarsest, or the other way round,
+/// above the coarsest unit and twice the share of simplification.
+fn disagreement(relief: &Relief, params: &finish::Params, units_mm: &[f64]) -> (f64, [f64; 3]) {
+    let coarsest_mm = units_mm.iter().copied().fold(0.0, f64::max);
+    let path = |unit_mm: f64| -> Vec<[f64; 3]> {
+        let site = Site { apart_mm: coarsest_mm, ..site(relief, unit_mm, 0.0) };
+        let moves = plan(&site, params).moves;
+        moves.iter().map(|to| to.to.map(|units| f64::from(units) * unit_mm)).collect()
+    };
+    let budget = site(relief, coarsest_mm, 0.0).budget;
+    let coarse = path(coarsest_mm);
+    let fine = units_mm.iter().filter(|unit_mm| **unit_mm < coarsest_mm).map(|&unit_mm| path(unit_mm));
+    fine.flat_map(|fine| [strays(&fine, &coarse), strays(&coarse, &fine)])
+        .map(|(far_mm, at)| (far_mm - coarsest_mm - 2.0 * budget.simplify_mm, at))
+        .fold((f64::NEG_INFINITY, [0.0; 3]), |most, at| if at.0 > most.0 { at } else { most })
+}
+
+#[test]
+fn all_grids_of_a_job_follow_one_curve() {
+    let cutters = ["ball:0.2", "flat:0.16", "bull:0.2:0.04", "vee:60:0.05:0.2", "taper:0.1:15:0.2"];
+    let directions = [0.0, 7.0, 20.0, 26.57, 33.7, 45.0, 60.0, 78.0, 100.0, 125.0, 150.0, 171.0];
+    for (i, (name, relief)) in surfaces().into_iter().enumerate() {
+        for (k, cutter) in cutters.into_iter().enumerate() {
+            for direction_deg in (0..3).map(|nth| directions[(i + 5 * k + 4 * nth) % directions.len()]) {
+                let params = finish::Params { direction_deg, ..params(cutter, 0.05) };
+                let (over_mm, at) = disagreement(&relief, &params, &[0.01, 0.001, 0.0001]);
+                assert!(over_mm <= 0.0, "{name}, {cutter}, {direction_deg}: {over_mm} too far at {at:?}");
+            }
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -435,21 +478,32 @@ proptest! {
         jump in 0.0..0.5f64,
         cutter in proptest::sample::select(vec!["ball:0.16", "flat:0.12", "bull:0.16:0.05", "ball:0.06"]),
         unit_mm in proptest::sample::select(vec![0.0001, 0.001, 0.01, 0.025]),
+        times in proptest::sample::select(vec![1.0, 1.0, 10.0, 100.0]),
         stray_mm in proptest::sample::select(vec![0.0, 0.0006]),
         direction_deg in prop_oneof![Just(0.0), Just(90.0), -180.0..180.0f64],
     ) {
-        let steepest = [0, 1].map(|k| planes.iter().map(|p| p[k].abs()).fold(0.0, f64::max));
-        let relief = Relief::new([0.36, 0.28], STEP, steepest, |x, y| {
-            let all = planes.iter().map(|p| p[0] * (x - 0.18) + p[1] * (y - 0.14) + p[2]);
-            let z = if bumps { all.fold(f64::INFINITY, f64::min) } else { all.fold(f64::NEG_INFINITY, f64::max) };
-            if x + 0.3 * y > 0.21 { z + jump } else { z }
-        });
-        let site = site(&relief, unit_mm, stray_mm);
+        let relief = facetted(&planes, bumps, jump);
+        // Beside a coarser grid, up to 0.025 mm.
+        let apart_mm = if unit_mm * times > 0.026 { unit_mm } else { unit_mm * times };
+        let site = Site { apart_mm, ..site(&relief, unit_mm, stray_mm) };
         let params = finish::Params { direction_deg, ..params(cutter, 0.05) };
         let path = plan(&site, &params);
         let mut stock = Stock::blank(&site);
         let cut = stock.cut(&site, params.shape, &path, 0.002, stray_mm);
         prop_assert!(stock.gouge_mm(&relief) <= GOUGE + FLOAT, "{}", stock.gouge_mm(&relief));
         prop_assert!(stray_mm > 0.0 || cut.deepest_rapid_mm == 0.0);
+    }
+
+    #[test]
+    fn random_facets_are_cut_alike_on_all_grids(
+        (planes, bumps) in facets(),
+        jump in 0.0..0.5f64,
+        cutter in proptest::sample::select(vec!["ball:0.16", "flat:0.12", "bull:0.16:0.05", "ball:0.06"]),
+        units_mm in proptest::sample::select(vec![[0.01, 0.001, 0.0001], [0.025, 0.005, 0.0001]]),
+        direction_deg in -180.0..180.0f64,
+    ) {
+        let params = finish::Params { direction_deg, ..params(cutter, 0.05) };
+        let (over_mm, at) = disagreement(&facetted(&planes, bumps, jump), &params, &units_mm);
+        prop_assert!(over_mm <= 0.0, "{} too far at {:?}", over_mm, at);
     }
 }

@@ -69,6 +69,21 @@ pub fn stepover_mm(shape: &Shape, scallop_mm: f64, slope_across: f64) -> Result<
 
 /// Where the passes lie and where on them the cutter location is evaluated.
 pub fn layout(site: &Site, params: &Params) -> Result<Layout, Error> {
+    Ok(layouts(site, params)?.0)
+}
+
+/// The passes on the controller's grid and on the coarsest grid of the job, by which slanted ones are planned. Both have
+/// the same positions.
+fn layouts(site: &Site, params: &Params) -> Result<(Layout, Layout), Error> {
+    let own = lay_out(site, params)?;
+    if site.times() == 1 {
+        return Ok((own.clone(), own));
+    }
+    let common = lay_out(&site.common(), params)?;
+    Ok((common.on_finer(site.times(), site.unit_mm), common))
+}
+
+fn lay_out(site: &Site, params: &Params) -> Result<Layout, Error> {
     site.validate(0.0)?;
     let (along, slope) = Axis::from_deg(params.direction_deg)?;
     if !(params.stock_to_leave_mm >= 0.0 && params.stock_to_leave_mm.is_finite()) {
@@ -147,9 +162,9 @@ fn passes(
     rest: Option<(&Rest, f64)>,
     progress: Progress,
 ) -> Result<Toolpath, Error> {
-    let layout = layout(site, params)?;
+    let (layout, common) = layouts(site, params)?;
     let lattice = site.surface.lattice();
-    let cutter = slant::cutter(params.shape, &layout, site)?;
+    let cutter = slant::cutter(params.shape, &common, site)?;
     let stepover_mm = layout.stepover_mm().unwrap_or(2.0 * params.shape.radius_mm());
     let slanted = layout.slope != 0.0;
     let longest_mm = link::LONGEST_STEPOVERS * stepover_mm;
@@ -178,16 +193,17 @@ fn passes(
             let ground = strip.as_ref().map(|strip| Ground::new(strip, &cutter));
             let envelopes = match &ground {
                 Some(ground) => cutter.envelopes(ground.strip, &ground.wide, &layout, first..end),
-                None => slant::envelopes(site, &cutter, &layout, first..end)?,
+                None => slant::envelopes(site, &params.shape, &cutter, &common, first..end)?,
             };
             let planned: Vec<(Vec<Run>, Tilt)> = (first..end)
                 .into_par_iter()
                 .zip(envelopes)
                 .map(|(k, mut envelope)| {
                     if let Some((rest, stay_mm)) = rest {
-                        rest.thin(&layout, k, stay_mm, &mut envelope.cl_mm);
+                        rest.thin(&common, k, stay_mm, &mut envelope.cl_mm);
                     }
-                    let (mut runs, tilt) = pass(site, params, &layout, k, stepover_mm, &envelope);
+                    let layouts = [&layout, &common];
+                    let (mut runs, tilt) = pass(site, params, layouts, k, stepover_mm, &envelope);
                     if backwards(params.pattern, layout.along, k) {
                         runs.reverse();
                         runs.iter_mut().for_each(|run| run.reverse());
@@ -252,7 +268,7 @@ fn passes(
     }
     let mut path = pen.finish();
     // Beside a line that the grid does not meet heights are known where its passes are laid there.
-    let known = layout.on_grid() || slant::tracks(&params.shape, &layout);
+    let known = layout.on_grid() || tip_radius_mm(&params.shape) > 0.0;
     path.tilt = (params.stock_to_leave_mm == 0.0 && known).then_some(tilt);
     Ok(path)
 }
@@ -292,7 +308,7 @@ fn joints(
 fn pass(
     site: &Site,
     params: &Params,
-    layout: &Layout,
+    [layout, common]: [&Layout; 2],
     k: usize,
     stepover_mm: f64,
     envelope: &Envelope,
@@ -322,9 +338,9 @@ fn pass(
             let leave_mm = params.stock_to_leave_mm;
             let exact: Vec<f64> =
                 envelope.cl_mm[i..end].iter().map(|&z| site.units(f64::from(z) + leave_mm)).collect();
-            let wanted: Vec<f64> =
-                envelope.bound_mm[i..end].iter().map(|&z| site.units(z + leave_mm)).collect();
-            let (points, above) = if envelope.beside.is_empty() {
+            let (points, kept, above) = if envelope.beside.is_empty() {
+                let wanted: Vec<f64> =
+                    envelope.bound_mm[i..end].iter().map(|&z| site.units(z + leave_mm)).collect();
                 let low: Vec<f64> = wanted.iter().map(|w| w - simplify).collect();
                 let high: Vec<f64> = wanted.iter().map(|w| w + excess).collect();
                 let vertices = match coarse {
@@ -333,14 +349,24 @@ fn pass(
                 };
                 let point = |&(at, z): &(usize, i32)| {
                     let along = layout.at(i + at);
-                    [along, layout.across(k, along), z]
+                    // Runs end at places of the coarsest grid, so that all controllers of a job link the same ones.
+                    let across = match at {
+                        _ if layout.slope == 0.0 => layout.across(k, along),
+                        at if at == 0 || i + at + 1 == end => {
+                            common.across(k, common.at(i + at)) * site.times()
+                        }
+                        _ => layout.across(k, along),
+                    };
+                    [along, across, z]
                 };
-                (vertices.iter().map(point).collect(), tilt::above(&exact, &vertices))
+                let above = tilt::above(&exact, &vertices);
+                (vertices.iter().map(point).collect(), wanted, above)
             } else {
-                let part = Part { pass: k, first: i, exact: &exact, line: &wanted, leave_mm };
-                track::lay(site, layout, &part, &envelope.beside[i..end], &measure)
+                let cl_mm = &envelope.cl_mm[i..end];
+                let part = Part { pass: k, first: i, cl_mm, beside: &envelope.beside[i..end], leave_mm };
+                track::lay(site, [layout, common], &part, &measure)
             };
-            let run = tilt::Run { exact: &exact, kept: &wanted, above: &above };
+            let run = tilt::Run { exact: &exact, kept: &kept, above: &above };
             tilt.add(&run, &measure, |at| layout.place_mm(k, i + at));
             out.push(points);
         }

@@ -18,13 +18,13 @@ pub(super) fn level(
     to: GridPoint,
     leave_mm: f64,
 ) -> Option<i32> {
-    let place = |p: GridPoint| [f64::from(p[0]) * site.unit_mm, f64::from(p[1]) * site.unit_mm];
-    let lowest_mm = ground.straight(cutter, place(from), place(to))? + leave_mm;
+    let lowest_mm = ground.straight(cutter, place(site, from), place(site, to))? + leave_mm;
     let z = site.unit_above(lowest_mm).max(from[2]).max(to[2]);
     (z <= site.unit_above(site.top_allowance_mm)).then_some(z)
 }
 
-/// [`level`] where no strip is held: reads what the link's cutter can meet.
+/// [`level`] where no strip is held: reads what the link's cutter can meet. Both ends are points of the coarsest grid of
+/// the job, on which it is decided whether the way is too high.
 pub(super) fn elsewhere(
     site: &Site,
     cutter: &Cutter,
@@ -33,11 +33,19 @@ pub(super) fn elsewhere(
     to: GridPoint,
     leave_mm: f64,
 ) -> Result<Option<i32>, Error> {
-    let end = |pick: fn(i32, i32) -> i32, axis: usize| f64::from(pick(from[axis], to[axis])) * site.unit_mm;
-    let low_mm = [0, 1].map(|axis| end(Ord::min, axis));
-    let high_mm = [0, 1].map(|axis| end(Ord::max, axis));
+    let (common, times) = (site.common(), site.times());
+    let [a, b] = [from, to].map(|p| place(&common, [p[0] / times, p[1] / times, 0]));
     let reach_mm = cutter.reach_mm;
-    let strip =
-        Strip::around(site.surface, along, low_mm.map(|mm| mm - reach_mm), high_mm.map(|mm| mm + reach_mm))?;
-    Ok(level(site, cutter, &Ground::new(&strip, cutter), from, to, leave_mm))
+    let low_mm = [0, 1].map(|axis| a[axis].min(b[axis]) - reach_mm);
+    let high_mm = [0, 1].map(|axis| a[axis].max(b[axis]) + reach_mm);
+    let strip = Strip::around(site.surface, along, low_mm, high_mm)?;
+    let Some(lowest_mm) = Ground::new(&strip, cutter).straight(cutter, a, b) else { return Ok(None) };
+    let lowest_mm = lowest_mm + leave_mm;
+    let free = common.unit_above(lowest_mm) <= common.unit_above(site.top_allowance_mm);
+    Ok(free.then(|| site.unit_above(lowest_mm).max(from[2]).max(to[2])))
+}
+
+/// Along and across in mm.
+fn place(site: &Site, at: GridPoint) -> [f64; 2] {
+    [f64::from(at[0]) * site.unit_mm, f64::from(at[1]) * site.unit_mm]
 }

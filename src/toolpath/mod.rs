@@ -197,6 +197,16 @@ impl Site<'_> {
         self.surface.bottom_mm() - self.surface.top_mm()
     }
 
+    /// The site as what all controllers of a job have in common sees it: the coarsest grid and the tightest budget.
+    fn common(&self) -> Self {
+        Site { unit_mm: self.apart_mm, budget: self.tightest, ..*self }
+    }
+
+    /// How many of its units make one of the coarsest grid.
+    fn times(&self) -> i32 {
+        ((self.apart_mm / self.unit_mm).round() as i32).max(1)
+    }
+
     /// Refuses what no path could be planned on. `reach_mm` is how far moves go beyond the tile.
     fn validate(&self, reach_mm: f64) -> Result<(), Error> {
         let numbers = [

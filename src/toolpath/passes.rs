@@ -174,6 +174,22 @@ impl Layout {
         }
     }
 
+    /// The same passes and positions on a grid of which `times` units of this one's make one.
+    pub(super) fn on_finer(&self, times: i32, unit_mm: f64) -> Layout {
+        let wide = i64::from(times);
+        Layout {
+            unit_mm,
+            start: self.start * times,
+            pitch: self.pitch * times,
+            passes: self.passes.iter().map(|across| across * times).collect(),
+            across: self.across.map(|across| across.saturating_mul(times)),
+            between_ends: self.between_ends * wide,
+            origin: self.origin * wide,
+            coarse: self.coarse * wide,
+            ..*self
+        }
+    }
+
     /// Place across of pass `k` at a place along it, in units.
     pub(super) fn across(&self, k: usize, along: i32) -> i32 {
         self.passes[k] + (self.slope * (i64::from(along) + self.origin) as f64).round() as i32
@@ -233,27 +249,12 @@ impl Layout {
 
     /// How far a move, whose ends are on the grid, passes the line between them, in mm.
     pub(super) fn aside_mm(&self) -> f64 {
-        self.aside_on_mm(1)
-    }
-
-    /// The same on the coarsest grid of the job.
-    pub(super) fn on_coarsest_grid(&self) -> bool {
-        self.aside_on_mm(self.coarse) <= STRAIGHT * self.pitch_mm()
-    }
-
-    /// A unit of the coarsest grid of the job in mm.
-    pub(super) fn coarsest_mm(&self) -> f64 {
-        self.coarse as f64 * self.unit_mm
-    }
-
-    /// How far grid points of so many units are from their line at most, in mm.
-    fn aside_on_mm(&self, units: i64) -> f64 {
         let off = |i: usize| {
-            let risen = self.slope * (i64::from(self.at(i)) + self.origin) as f64 / units as f64;
+            let risen = self.slope * (i64::from(self.at(i)) + self.origin) as f64;
             (risen - risen.round()).abs()
         };
         // One pass is as good as any: they lie whole units apart.
-        (0..self.count).map(off).fold(0.0, f64::max) * units as f64 * self.unit_mm
+        (0..self.count).map(off).fold(0.0, f64::max) * self.unit_mm
     }
 
     /// Between passes in mm, as the cutter meets them.

@@ -1,8 +1,8 @@
 //! Bounds of passes that run at an angle to the samples.
 //!
-//! Heights are those of a line. Where the controller's grid is so fine that the cutter stands on it as good as
-//! everywhere, that is all; the cutter is allowed to stray sideways by the little that is missing. On a coarser grid the
-//! heights to both sides are needed too, and `track.rs` chooses between them.
+//! They are asked for once for all controllers of a job, as the coarsest grid among them needs them. Where it meets the
+//! lines, heights are those of a line; the cutter is allowed to stray sideways by the little that is missing. Otherwise
+//! heights to both sides are needed too, and `track.rs` makes of them the curve that all of the controllers follow.
 
 use std::ops::Range;
 
@@ -28,7 +28,7 @@ const GROUP_RADII: f64 = 0.1;
 /// Passes that are planned together.
 const BAND: usize = 64;
 
-/// How far beside the line heights are known, in units of the grid.
+/// How far beside the line heights are known, in units of the coarsest grid.
 pub(super) const SIDES: [f64; 4] = [-1.0, -0.5, 0.5, 1.0];
 
 /// Heights of places a unit to both sides that bend by less than this part of one lie in line with what is between.
@@ -62,24 +62,21 @@ impl Beside {
 
 /// Whether the passes of a cutter are laid between grid points beside their lines. Without a round tip only a widened
 /// cutter tells what lies between two positions, so each would be a vertex: it is widened by half a unit more instead.
-pub(super) fn tracks(shape: &Shape, layout: &Layout) -> bool {
-    tip_radius_mm(shape) > 0.0 && !layout.on_grid()
+fn tracks(shape: &Shape, common: &Layout) -> bool {
+    tip_radius_mm(shape) > 0.0 && !common.on_grid()
 }
 
-/// The cutter of an operation. Moves between grid points beside a line are longer than along it; so that all controllers
-/// of a job keep to the same heights, it is one that fits the coarsest grid among them.
-pub(super) fn cutter(shape: Shape, layout: &Layout, site: &Site) -> Result<Cutter, compensation::Error> {
+/// The cutter of an operation, for passes on the coarsest grid of the job. Moves between grid points beside a line are
+/// longer than along it.
+pub(super) fn cutter(shape: Shape, common: &Layout, site: &Site) -> Result<Cutter, compensation::Error> {
     let step_mm = site.surface.lattice().step_mm;
-    let track = tracks(&shape, layout);
-    let aside_mm = if track { 0.0 } else { layout.aside_mm() };
-    if layout.on_coarsest_grid() || tip_radius_mm(&shape) == 0.0 {
-        return Cutter::new(shape, step_mm, layout.length_mm(), aside_mm, site.tightest);
+    if !tracks(&shape, common) {
+        return Cutter::new(shape, step_mm, common.length_mm(), common.aside_mm(), site.tightest);
     }
     // A unit more or less across than the line; and half a unit is between two of the heights beside it where they bend.
-    let unit_mm = layout.coarsest_mm();
-    let across_mm = layout.pitch_mm() * layout.slope.abs() + unit_mm;
-    let longest_mm = layout.pitch_mm().hypot(across_mm).hypot(0.5 * unit_mm);
-    Cutter::new(shape, step_mm, longest_mm, aside_mm, site.tightest)
+    let across_mm = common.pitch_mm() * common.slope.abs() + common.unit_mm;
+    let longest_mm = common.pitch_mm().hypot(across_mm).hypot(0.5 * common.unit_mm);
+    Cutter::new(shape, step_mm, longest_mm, 0.0, site.tightest)
 }
 
 /// How many passes from `first` on make a band.
@@ -87,22 +84,21 @@ pub(super) fn band_length(layout: &Layout, first: usize) -> usize {
     BAND.min(layout.passes.len() - first)
 }
 
-/// The bounds of some passes, block by block along them.
+/// The bounds of some passes on the coarsest grid of the job, block by block along them.
 pub(super) fn envelopes(
     site: &Site,
+    shape: &Shape,
     cutter: &Cutter,
     layout: &Layout,
     passes: Range<usize>,
 ) -> Result<Vec<Envelope>, Error> {
-    let track = cutter.tip_mm > 0.0 && !layout.on_grid();
+    let track = tracks(shape, layout);
     let nothing = || Envelope {
         bound_mm: vec![f64::NEG_INFINITY; layout.count],
         cl_mm: vec![f32::NAN; layout.count],
         beside: if track { vec![Beside::UNKNOWN; layout.count] } else { Vec::new() },
     };
-    // As the cutter: the same for all controllers.
-    let aside = cutter.tip_mm > 0.0 && !layout.on_coarsest_grid();
-    let beside_mm = if aside { layout.coarsest_mm() } else { 0.0 };
+    let beside_mm = if track { layout.unit_mm } else { 0.0 };
     let mut out: Vec<Envelope> = passes.clone().map(|_| nothing()).collect();
     let end = layout.count.saturating_sub(1);
     for from in (0..end).step_by(BLOCK) {
@@ -195,6 +191,12 @@ impl Block<'_> {
                     continue;
                 }
                 let lowest_mm = left.min(right);
+                if let Some([a, b]) =
+                    envelope.beside.get_mut(i..).and_then(|rest| rest.first_chunk_mut::<2>())
+                {
+                    self.beside(k, i, lowest_mm, [a, b], &mut ceiling, &mut near);
+                    continue;
+                }
                 let contact = self.cutter.contact_mm(lowest_mm, &mut ceiling);
                 let (left, right) = match contact.and_then(|t| self.cutter.lift_mm(t)) {
                     Some(lift_mm) => (left + lift_mm, right + lift_mm),
@@ -208,31 +210,39 @@ impl Block<'_> {
                 };
                 envelope.bound_mm[i] = envelope.bound_mm[i].max(left);
                 envelope.bound_mm[i + 1] = envelope.bound_mm[i + 1].max(right);
-                let Some([a, b]) = envelope.beside.get_mut(i..).and_then(|rest| rest.first_chunk_mut::<2>())
-                else {
-                    continue;
-                };
-                let lowest_mm = a.cl_mm.iter().chain(&b.cl_mm).fold(lowest_mm, |low, &z| low.min(z));
-                let contact = self.cutter.contact_mm(lowest_mm, &mut ceiling);
-                if let Some(lift_mm) = contact.and_then(|t| self.cutter.lift_mm(t)) {
-                    a.lift_mm = a.lift_mm.max(lift_mm);
-                    b.lift_mm = b.lift_mm.max(lift_mm);
-                    continue;
-                }
-                for (beside, i) in [(&mut *a, i), (&mut *b, i + 1)] {
-                    if !beside.steep {
-                        beside.steep = true;
-                        beside.points_mm = self.points(k, i, &mut near);
-                    }
-                }
-                a.lifts_mm = a.points_mm.map(|from| {
-                    b.points_mm.map(|to| {
-                        let contact = self.cutter.contact_mm(from[0].min(to[0]), &mut ceiling);
-                        contact.and_then(|t| self.cutter.curved_lift_mm(t, f64::INFINITY))
-                    })
-                });
             }
         }
+    }
+
+    /// What an interval asks for beside its line, which is at `lowest_mm` at its lower end.
+    fn beside(
+        &self,
+        k: usize,
+        i: usize,
+        lowest_mm: f64,
+        [a, b]: [&mut Beside; 2],
+        ceiling: &mut dyn FnMut(usize) -> f64,
+        near: &mut Option<[usize; 2]>,
+    ) {
+        let lowest_mm = a.cl_mm.iter().chain(&b.cl_mm).fold(lowest_mm, |low, &z| low.min(z));
+        let contact = self.cutter.contact_mm(lowest_mm, &mut *ceiling);
+        if let Some(lift_mm) = contact.and_then(|t| self.cutter.lift_mm(t)) {
+            a.lift_mm = a.lift_mm.max(lift_mm);
+            b.lift_mm = b.lift_mm.max(lift_mm);
+            return;
+        }
+        for (beside, i) in [(&mut *a, i), (&mut *b, i + 1)] {
+            if !beside.steep {
+                beside.steep = true;
+                beside.points_mm = self.points(k, i, near);
+            }
+        }
+        a.lifts_mm = a.points_mm.map(|from| {
+            b.points_mm.map(|to| {
+                let contact = self.cutter.contact_mm(from[0].min(to[0]), &mut *ceiling);
+                contact.and_then(|t| self.cutter.curved_lift_mm(t, f64::INFINITY))
+            })
+        });
     }
 
     /// Exact and widened locations at the grid points next to a position.
