@@ -324,6 +324,11 @@ fn pass(
     let simplify = site.budget.simplify_mm / site.unit_mm;
     // With what simplification may take below, a whole unit always lies between the bounds.
     let excess = (1.0 - simplify).max(0.0) + EXCESS_MM / site.unit_mm;
+    // Half a unit beside its line the cutter has less room to stand higher.
+    let excess = match layout.on_grid() {
+        true => excess,
+        false => excess.min((1.0 - simplify).max(((1.0 + simplify).powi(2) - 0.25).sqrt())),
+    };
     let mut out = Vec::new();
     let mut tilt = Tilt::default();
     let mut i = 0;
@@ -343,10 +348,20 @@ fn pass(
                     envelope.bound_mm[i..end].iter().map(|&z| site.units(z + leave_mm)).collect();
                 let low: Vec<f64> = wanted.iter().map(|w| w - simplify).collect();
                 let high: Vec<f64> = wanted.iter().map(|w| w + excess).collect();
-                let vertices = match coarse {
-                    true => ends::lay(&low, &high, &exact, &measure),
-                    false => funnel::simplify(&low, &high, &wanted),
+                let lay = |part: Range<usize>| match coarse {
+                    true => ends::lay(&low[part.clone()], &high[part.clone()], &exact[part], &measure),
+                    false => funnel::simplify(&low[part.clone()], &high[part.clone()], &wanted[part]),
                 };
+                // A finer grid ends beside its line, where the coarsest does, and goes along it from the next position on.
+                let last = end - i - 1;
+                let parts = match layout.slope != 0.0 && site.times() > 1 && last > 1 {
+                    true => vec![0..1, 1..last, last..last + 1],
+                    false => vec![0..last + 1],
+                };
+                let parts = parts.into_iter().map(|part| (part.start, lay(part)));
+                let vertices: Vec<(usize, i32)> = parts
+                    .flat_map(|(first, vertices)| vertices.into_iter().map(move |(at, z)| (first + at, z)))
+                    .collect();
                 let point = |&(at, z): &(usize, i32)| {
                     let along = layout.at(i + at);
                     // Runs end at places of the coarsest grid, so that all controllers of a job link the same ones.
