@@ -79,6 +79,18 @@ fn a_sound_program_passes() {
     let report = report(dir.path());
     assert_eq!(report["verdict"], "pass");
     assert_eq!(figure(&report, "gouge_max_mm"), 0.0);
+    let bytes = || std::fs::read(dir.path().join("out/report.json")).expect("a report");
+    let before = bytes();
+    let after_its_cutter =
+        ["--cutter", "ball:1", "p.ngc", "--part", "H.tif", "--out", "out", "--zero", "0", "0", "5.4"];
+    screenmill()
+        .current_dir(dir.path())
+        .arg("simulate")
+        .args(after_its_cutter)
+        .args(["--stock-top-mm", "5.6", "--machine", "linuxcnc-mill", "--quiet"])
+        .assert()
+        .success();
+    assert!(bytes() == before, "the same wherever the program stands");
     // 0.2 um of lift and the scallop of 0.05 mm passes, 0.63 um.
     assert!(figure(&report, "excess_max_mm") < 0.0009, "{report}");
     assert!(figure(&report, "normal_p95_deg") < 3.0, "{report}");
@@ -188,6 +200,21 @@ fn what_cannot_be_judged_is_refused_and_leaves_nothing() {
     simulate(dir.path(), &["--cutter", "ball:1", "ball:0.5"]).code(2).stderr(
         "error: 1 programs and 2 cutters; hint: --cutter takes one cutter per program, in their order\n",
     );
+    let cutter = |words: &[&str]| {
+        screenmill()
+            .current_dir(dir.path())
+            .args(["simulate", "--part", "H.tif", "--out", "out"])
+            .args(words)
+            .assert()
+    };
+    cutter(&["--cutter", "ball:1", "no.ngc"]).code(2).stderr(predicate::str::starts_with(
+        "error: --cutter no.ngc names no file, and as a cutter: cutter \"no.ngc\" has no known profile; hint: ball:D, ",
+    ));
+    std::fs::write(dir.path().join("q.ngc"), &whole).expect("a program");
+    cutter(&["q.ngc", "--cutter", "ball:1", "p.ngc"]).code(2).stderr(
+        "error: p.ngc stands after --cutter and q.ngc does not, so which runs first is not clear; hint: all programs before --cutter\n",
+    );
+    cutter(&["--cutter", "ball:1"]).code(2);
     simulate(dir.path(), &["--cutter", "ball:1", "--machine", "nothing"]).code(2);
     simulate(dir.path(), &["--zero", "0", "0", "1e9"])
         .code(2)
@@ -247,7 +274,7 @@ fn an_estimate_says_what_limits() {
         .assert()
         .success()
         .stdout(predicate::str::contains("10.0 s cutting 100.0 mm").and(predicate::str::contains(
-            "line 3: cuts before it has positioned, it is taken to start at its zero",
+            "line 3: moves before it has positioned, it is taken to start at its zero",
         )));
     let far = "G21 G90\nM3 S9000\nG0 Z5\nG0 X0 Y0\nG1 Z-1 F80\nX900\nG0 Z5\nM2\n";
     std::fs::write(dir.path().join("far.ngc"), far).expect("a program");

@@ -40,6 +40,8 @@ fn units_distances_and_spelling_do_not_matter() {
         PLAIN,
         "%\nO0001 \n(part)\ng21g90g017m03\nN10 g00 z + 5.\nN20 x0y0\ng01z-.5f300 ; down\nX2 5.4Y12.70(along)\nx-01.5\ng0z5\nm02\nG1 X99\n",
     );
+    // What ends a scaling, a macro, a rotation and polar coordinates that no block began.
+    same(PLAIN, &PLAIN.replace("G17", "G17 G40 G49 G80 G69 G15 G50 G67 G97"));
     for end in ["\r\n", "\r"] {
         same(PLAIN, &PLAIN.replace('\n', end));
         assert_eq!(lines_of(PLAIN), lines_of(&PLAIN.replace('\n', end)));
@@ -138,7 +140,7 @@ fn arcs_are_chords_within_a_tenth_of_a_micrometre() {
     assert!((quarter.extent().cutting_mm - 5.0 * std::f64::consts::PI).abs() < 1e-3);
     // By R, by absolute centre, in inches and the long way round.
     for other in
-        ["G3 X0 Y10 R10", "G90.1 G3 X0 Y10 I0 J0", "G20 G3 X0 Y0.393700787401575 I-0.393700787401575 J0"]
+        ["G3 X0 Y10 R10", "G90.1 G3 X0 Y10 I0 J0", "G20\nG3 X0 Y0.393700787401575 I-0.393700787401575 J0"]
     {
         let other = read(&format!("{head}{other} F100\nM2\n"));
         assert!((other.extent().cutting_mm - quarter.extent().cutting_mm).abs() < 1e-6);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use screenmill::cutter::Shape;
+use screenmill::cutter::{ParseError, Shape};
 use screenmill::fidelity::{self, Figures, Layers, Tally};
 use screenmill::grid::{Lattice, Window};
 use screenmill::machine::Machine;
@@ -31,11 +31,11 @@ const STEP_MM: f64 = 0.01;
 #[derive(clap::Args, Clone, Debug)]
 pub struct Arguments {
     /// Programs in G-code or RML-1, in the order they run
-    #[arg(required = true, value_name = "PROGRAM")]
+    #[arg(required_unless_present = "cutters", value_name = "PROGRAM")]
     programs: Vec<PathBuf>,
-    /// One cutter a program, in their order, e.g. ball:1
+    /// One cutter a program, in their order, e.g. ball:1; programs may follow their cutters
     #[arg(long = "cutter", required = true, num_args = 1.., value_delimiter = ',', value_name = "C")]
-    cutters: Vec<Shape>,
+    cutters: Vec<String>,
     /// What the cut should be
     #[arg(long, value_name = "H.tif")]
     part: PathBuf,
@@ -66,6 +66,12 @@ enum Refused {
         "{programs} programs and {cutters} cutters; hint: --cutter takes one cutter per program, in their order"
     )]
     Cutters { programs: usize, cutters: usize },
+    #[error("--cutter {value} names no file, and as a cutter: {source}")]
+    Cutter { value: String, source: ParseError },
+    #[error(
+        "{after} stands after --cutter and {before} does not, so which runs first is not clear; hint: all programs before --cutter"
+    )]
+    Order { before: String, after: String },
     #[error("{what} names {value} mm; hint: it must lie in -100000 .. 100000")]
     Far { what: &'static str, value: f64 },
     #[error("{path}: {source}; hint: --out names a folder that can be written")]
@@ -117,8 +123,29 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     Ok(if failed { Outcome::Found } else { Outcome::Within })
 }
 
+/// Programs and cutters: `--cutter` takes all that follows it up to the next flag, programs included.
+fn told_apart(arguments: &Arguments) -> Result<(Vec<PathBuf>, Vec<Shape>), Refused> {
+    let (mut after, mut cutters) = (Vec::new(), Vec::new());
+    for value in &arguments.cutters {
+        match value.parse::<Shape>() {
+            Ok(shape) => cutters.push(shape),
+            Err(_) if Path::new(value).exists() => after.push(PathBuf::from(value)),
+            Err(source) => return Err(Refused::Cutter { value: value.clone(), source }),
+        }
+    }
+    match (arguments.programs.first(), after.first()) {
+        (Some(before), Some(after)) => {
+            let [before, after] = [before, after].map(|path| path.display().to_string());
+            Err(Refused::Order { before, after })
+        }
+        (None, _) => Ok((after, cutters)),
+        (Some(_), None) => Ok((arguments.programs.clone(), cutters)),
+    }
+}
+
 fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal> {
-    let Arguments { programs, cutters, part, .. } = arguments;
+    let part = &arguments.part;
+    let (programs, cutters) = told_apart(arguments)?;
     if programs.len() != cutters.len() {
         return Err(Refused::Cutters { programs: programs.len(), cutters: cutters.len() }.into());
     }
@@ -145,7 +172,7 @@ fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal>
     let read_as = machine.as_ref().map(reading_options).transpose()?.unwrap_or_default();
     console.begin("read programs", programs.len() as u64);
     let mut readings = Vec::new();
-    for path in programs {
+    for path in &programs {
         readings.push(read(path, &read_as)?);
         console.advance(1);
     }
@@ -155,7 +182,7 @@ fn judge(arguments: &Arguments, console: &Console) -> Result<Judgement, Refusal>
         top_mm: stock_top_mm,
     };
     let judged: Vec<Judged> =
-        readings.iter().zip(cutters).map(|(reading, shape)| Judged::new(reading, *shape, zero_mm)).collect();
+        readings.iter().zip(&cutters).map(|(reading, shape)| Judged::new(reading, *shape, zero_mm)).collect();
     std::fs::create_dir_all(&arguments.out)
         .map_err(|source| Refused::Folder { path: arguments.out.clone(), source })?;
     let cut = cut(surface.as_ref(), &judged, &blank, &arguments.out, console)?;

@@ -89,6 +89,14 @@ pub enum Error {
     #[error("{at}: the arc has neither a centre in its plane nor R; hint: G17 takes I J, G18 I K, G19 J K")]
     ArcCentre { at: Place },
     #[error(
+        "{at}: an absolute centre (G90.1) with one of its two words; hint: name both, controllers take the other for 0, for where the arc starts, or not at all"
+    )]
+    ArcAbsolute { at: Place },
+    #[error(
+        "{at}: a feed in the block that changes the units: LinuxCNC takes it in those before, Grbl in those after; hint: F in a later block"
+    )]
+    FeedUnits { at: Place },
+    #[error(
         "{at}: the arc's end lies at radius {end_mm:.4} mm, its start at {start_mm:.4} mm; hint: is the centre relative (G91.1) or absolute (G90.1)?"
     )]
     ArcRadius { at: Place, start_mm: f64, end_mm: f64 },

@@ -82,7 +82,7 @@ pub enum Note {
     SpindleOn { line: u32 },
     /// The first line that its controller may not take whole.
     LongLine { line: u64, column: u64, most: usize },
-    /// The first feed motion comes before a position that the text names.
+    /// The first feed motion, or one by an increment, comes before a position that the text names.
     FromZero { line: u32 },
     /// Some controllers count P in milliseconds.
     LongDwell { line: u32, seconds: f64 },
@@ -107,7 +107,7 @@ impl fmt::Display for Note {
                 )
             }
             Note::FromZero { line } => {
-                write!(f, "line {line}: cuts before it has positioned, it is taken to start at its zero")
+                write!(f, "line {line}: moves before it has positioned, it is taken to start at its zero")
             }
             Note::LongDwell { line, seconds } => {
                 write!(
@@ -136,7 +136,7 @@ pub struct Options {
     pub rml_unit_mm: f64,
     /// What its controller takes of a line of G-code; None where it is not known which one reads it.
     pub line: Option<LineLimit>,
-    /// G-code that cuts before it has positioned is taken to start at its zero, and a note says so. Enough for its
+    /// G-code that cuts, or moves by increments, before it has positioned is taken to start at its zero, and a note says so. Enough for its
     /// time; a judge must know where the cutter is, and such a program is refused to it.
     pub from_zero: bool,
 }

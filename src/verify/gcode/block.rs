@@ -23,8 +23,10 @@ pub(super) enum Group {
     Coolant,
     Override,
     Air,
+    /// Ends something that is not read while it holds; any number of them may stand in a block.
+    End,
 }
-const GROUPS: usize = 18;
+const GROUPS: usize = 19;
 
 /// Words of one block. Codes are kept in tenths: G91.1 is 911.
 pub(super) struct Block {
@@ -36,6 +38,8 @@ pub(super) struct Block {
     pub line: u64,
     pub words: usize,
     pub percent: bool,
+    /// G50 or G50.1 stands in it.
+    pub scaling: bool,
 }
 
 impl Block {
@@ -49,6 +53,7 @@ impl Block {
             line: 0,
             words: 0,
             percent: false,
+            scaling: false,
         }
     }
 
@@ -100,6 +105,7 @@ impl Block {
         self.words = 0;
         self.line = line;
         self.percent = false;
+        self.scaling = false;
         let mut i = 0;
         while i < text.len() {
             let byte = text[i];
@@ -167,11 +173,12 @@ impl Block {
                 };
                 let letter = letter as char;
                 let group = group.ok_or(Error::Code { at, letter, number: value })?;
-                if let Some((first, _)) = self.codes[group as usize] {
+                if let Some((first, _)) = self.codes[group as usize].filter(|_| group != Group::End) {
                     let first = f64::from(first) / 10.0;
                     return Err(Error::Conflict { at, letter, first, second: value });
                 }
                 self.codes[group as usize] = Some((code as u16, column));
+                self.scaling |= matches!((letter, code as u16), ('G', 500 | 501));
             }
             b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K' | b'R' | b'F' | b'S' | b'T' | b'N' | b'O' | b'P'
             | b'Q' | b'H' | b'L' | b'E' => {
@@ -277,6 +284,7 @@ fn g_group(code: u16, at: Place) -> Result<Option<Group>, Error> {
         400 => Group::CutterSide,
         430 | 490 => Group::LengthOffset,
         980 | 990 => Group::Return,
+        150 | 500 | 501 | 670 | 690 | 970 => Group::End,
         540 | 550 | 560 | 570 | 580 | 590 | 591 | 592 | 593 => Group::Offset,
         610 | 611 | 640 | 1870 => Group::PathMode,
         930 => return unread("G93", "inverse time feed", "write feeds in mm/min (G94)"),
@@ -296,13 +304,21 @@ fn g_group(code: u16, at: Place) -> Result<Option<Group>, Error> {
         920..=923 => return unread("G92", "a shift of the origin", "set the work offset in the controller"),
         520 => return unread("G52", "a shift of the origin", "set the work offset in the controller"),
         100 => return unread("G10", "a change of offsets", "set the work offset in the controller"),
-        510 | 680 | 690 => {
+        160 => return unread("G16", "polar coordinates", "write the motions as they are cut"),
+        510 | 511 | 680 => {
             return unread("G51/G68", "a scaling or rotation", "write the motions as they are cut");
         }
         380..=385 => return unread("G38", "a probing motion", "probe before the program starts"),
         330 | 331 => return unread("G33", "a spindle-synchronised motion", "use G1"),
-        50..=53 => return unread("G5", "a spline", "write it out with G1"),
+        50..=53 => {
+            return unread(
+                "G5",
+                "a spline, or a way of looking ahead",
+                "write a spline out with G1, leave the other out",
+            );
+        }
         650 | 660 => return unread("G65", "a macro call", "write its motions out with G0 and G1"),
+        960 => return unread("G96", "a constant surface speed", "name the spindle's speed (G97)"),
         _ => return Ok(None),
     }))
 }

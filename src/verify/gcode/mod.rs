@@ -2,8 +2,8 @@
 //!
 //! Read: G0 G1 G2 G3 (with G17 G18 G19, I J K relative or absolute, R, helices, turns by P), G4, G20 G21,
 //! G28 G30, G40, G43 G49, G53 with G0, G54-G59.3, G61 G61.1 G64 G187, G80, G90 G91, G90.1 G91.1, G94, G98
-//! G99, M0-M9, M12 M13, M30, M48 M49, M60, F H N O S T, comments, `%`. Everything else is refused: a
-//! judge that skips a word has judged another program.
+//! G99, M0-M9, M12 M13, M30, M48 M49, M60, F H N O S T, comments, `%`; G15, G50, G67, G69 and G97, which end
+//! what is not read while it holds. Everything else is refused: a judge that skips a word has judged another program.
 
 mod arc;
 mod block;
@@ -138,7 +138,19 @@ impl Modal {
         let line = u32::try_from(block.line).unwrap_or(u32::MAX);
         self.labels(block)?;
         if let Some((code, _)) = block.code(Group::Units) {
-            self.unit_mm = if code == 200 { INCH_MM } else { 1.0 };
+            let unit_mm = if code == 200 { INCH_MM } else { 1.0 };
+            if unit_mm != self.unit_mm && block.has(b'F') {
+                return Err(Error::FeedUnits { at: block.place(b'F') });
+            }
+            self.unit_mm = unit_mm;
+        }
+        if block.scaling && [b'X', b'Y', b'Z'].into_iter().any(|letter| block.has(letter)) {
+            return Err(Error::Unread {
+                at: block.first_place(b"XYZ"),
+                code: "G50 with X, Y or Z",
+                what: "a shift of the origin, or of a scaling",
+                hint: "G50 alone, or without it",
+            });
         }
         if let Some(feed) = block.take(b'F') {
             self.feed_mm_min =
@@ -271,7 +283,7 @@ impl Modal {
             if let Some(value) = block.take(letter) {
                 let value =
                     self.bounded(block, letter, "the coordinate in mm", value * self.unit_mm, -1e5, 1e5)?;
-                target[axis] = if self.relative { self.at_mm[axis] + value } else { value };
+                target[axis] = if self.relative { target[axis] + value } else { value };
             }
         }
         Ok(target)
@@ -331,8 +343,20 @@ impl Modal {
         if self.from_zero && self.motion.is_some_and(|motion| motion != 0) {
             self.from_zero = false;
             if self.at_mm.iter().any(|mm| mm.is_nan()) {
-                notes.push(Note::FromZero { line });
+                if !notes.iter().any(|note| matches!(note, Note::FromZero { .. })) {
+                    notes.push(Note::FromZero { line });
+                }
                 self.rapid(self.at_mm.map(|mm| if mm.is_nan() { 0.0 } else { mm }), line, each)?;
+            }
+        }
+        if self.from_zero && self.relative {
+            for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
+                if block.has(letter) && self.at_mm[axis].is_nan() {
+                    self.at_mm[axis] = 0.0;
+                    if !notes.iter().any(|note| matches!(note, Note::FromZero { .. })) {
+                        notes.push(Note::FromZero { line });
+                    }
+                }
             }
         }
         let start = self.at_mm;
@@ -393,6 +417,9 @@ impl Modal {
         let letters = [b'I' + axes[0] as u8, b'I' + axes[1] as u8];
         if !letters.iter().any(|l| block.has(*l)) {
             return Err(Error::ArcCentre { at });
+        }
+        if self.centre_absolute && !letters.iter().all(|l| block.has(*l)) {
+            return Err(Error::ArcAbsolute { at });
         }
         let mut centre = [0.0; 2];
         for i in 0..2 {
