@@ -136,18 +136,26 @@ impl Lines {
 #[derive(Clone, Copy)]
 pub(super) struct Samples {
     /// Samples per mm.
-    pub per_mm: f64,
+    per_mm: f64,
     /// The window's first, and how many it has.
-    pub start: f64,
-    pub count: f64,
+    start: f64,
+    count: f64,
 }
 
 impl Samples {
+    pub(super) fn new(per_mm: f64, start: i64, count: usize) -> Samples {
+        Samples { per_mm, start: start as f64, count: count.min(i32::MAX as usize) as f64 }
+    }
+
     /// The first sample of the window at `mm` or past it. Counted from the part's corner first, so that no
     /// block sees another range.
     #[inline(always)]
     pub(super) fn index(&self, mm: f64) -> i32 {
-        (((mm * self.per_mm - 0.5).ceil() - self.start).max(0.0).min(self.count)) as i32
+        let at = (mm * self.per_mm - 0.5).ceil() - self.start;
+        let at = if at > 0.0 { at } else { 0.0 };
+        let at = if at < self.count { at } else { self.count };
+        // SAFETY: a number from 0 to a count that fits.
+        unsafe { at.to_int_unchecked() }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::contact::Contact;
 use super::super::judged::{CHUNK, Judged};
-use super::above::Above;
+use super::above::{Above, GROUP};
 use super::along::{Lines, Samples};
 use super::bite::{Bite, ProgramCut, Watch};
 use super::leg::{Leg, Lie};
@@ -37,8 +37,7 @@ impl Band<'_> {
             |l: [f64; 2], h: [f64; 2]| h[0] < low[0] || l[0] > high[0] || h[1] < low[1] || l[1] > high[1];
         let mut lines = Lines::new(columns, rows);
         // No sample stands higher now or later, and no cutter is lower than its tip.
-        let top = self.z_mm.iter().fold(f32::NEG_INFINITY, |most, z| if *z > most { *z } else { most });
-        let top = f64::from(top) + ROUNDED_MM;
+        let top = f64::from(highest(self.z_mm)) + ROUNDED_MM;
         for (chunk, bounds) in judged.chunks.iter().enumerate() {
             if apart(bounds[0], bounds[1]) {
                 continue;
@@ -86,7 +85,7 @@ impl Band<'_> {
     pub(super) fn samples(&self, axis: usize) -> Samples {
         let Window { column, row, columns, rows } = self.window;
         let (start, count) = if axis == 0 { (column, columns) } else { (row, rows) };
-        Samples { per_mm: self.per_mm, start: start as f64, count: count as f64 }
+        Samples::new(self.per_mm, start, count)
     }
 
     /// First and one past the last index along an axis whose samples lie in low .. high mm.
@@ -177,4 +176,19 @@ impl Band<'_> {
             }
         }
     }
+}
+
+/// The highest of all that are numbers, found in as many places at once as vectors have.
+#[inline(always)]
+fn highest(z_mm: &[f32]) -> f32 {
+    let higher = |a: f32, b: f32| if b > a { b } else { a };
+    let mut most = [f32::NEG_INFINITY; GROUP];
+    let groups = z_mm.chunks_exact(GROUP);
+    let rest = groups.remainder().iter().copied();
+    for group in groups {
+        for (most, z) in most.iter_mut().zip(group) {
+            *most = higher(*most, *z);
+        }
+    }
+    most.into_iter().chain(rest).fold(f32::NEG_INFINITY, higher)
 }
