@@ -102,6 +102,11 @@ pub(super) fn doubled_area(polygon: &[[f64; 2]]) -> f64 {
 pub(super) struct Planes {
     planes: Vec<Plane>,
     y_range: Vec<[f32; 2]>,
+    /// The planes that cut each one's polygon, in the order in which they were tried: no others do in any part of
+    /// the domain. Empty for more planes than it can number.
+    cutting: Vec<u16>,
+    /// Where each plane's begin, and where the last one's end.
+    starts: Vec<u32>,
 }
 
 impl Planes {
@@ -127,24 +132,62 @@ impl Planes {
         all.dedup();
         // A range is widened by a millionth of the domain: more than single precision loses.
         let slack = 1e-6 * (domain.high[1] - domain.low[1]);
-        let mut out =
-            Planes { planes: Vec::with_capacity(all.len()), y_range: Vec::with_capacity(all.len()) };
-        let (mut polygon, mut scratch) = (Vec::new(), Vec::new());
+        let mut out = Planes {
+            planes: Vec::with_capacity(all.len()),
+            y_range: Vec::with_capacity(all.len()),
+            cutting: Vec::new(),
+            starts: vec![0],
+        };
+        let mut cell = PowerCell::default();
         for index in 0..all.len() {
-            power_cell(&all, index, domain, &mut polygon, &mut scratch);
-            if polygon.is_empty() {
+            cell.of(&all, index, domain, outward(index, all.len()));
+            if cell.polygon.is_empty() {
                 continue;
             }
             let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-            for p in &polygon {
+            for p in &cell.polygon {
                 low = low.min(p[1]);
                 high = high.max(p[1]);
             }
-            each(&all[index], &polygon);
+            each(&all[index], &cell.polygon);
             out.planes.push(all[index]);
             out.y_range.push([(low - slack) as f32, (high + slack) as f32]);
+            out.keep(&cell.cut_by);
         }
+        if out.planes.len() < all.len() {
+            // What a plane cut that is itself nowhere the lowest is cut by others again.
+            (out.cutting, out.starts) = (Vec::new(), vec![0]);
+            for index in 0..out.planes.len() {
+                cell.of(&out.planes, index, domain, outward(index, out.planes.len()));
+                out.keep(&cell.cut_by);
+            }
+        }
+        out.cutting.shrink_to_fit();
         out
+    }
+
+    fn keep(&mut self, cut_by: &[usize]) {
+        self.cutting.extend(cut_by.iter().filter_map(|&index| u16::try_from(index).ok()));
+        self.starts.push(self.cutting.len() as u32);
+    }
+
+    /// Calls `each` with every plane's polygon inside `part` of the domain, counter-clockwise; planes that have none
+    /// there are left out.
+    pub fn polygons(&self, part: &Rect, mut each: impl FnMut(&Plane, &[[f64; 2]])) {
+        let count = self.planes.len();
+        let mut cell = PowerCell::default();
+        for (index, plane) in self.planes.iter().enumerate() {
+            if count <= usize::from(u16::MAX) {
+                let [start, end] = [self.starts[index], self.starts[index + 1]].map(|at| at as usize);
+                let cutting = self.cutting[start..end].iter().map(|&other| usize::from(other));
+                cell.of(&self.planes, index, part, cutting);
+            } else {
+                cell.of(&self.planes, index, part, outward(index, count));
+            }
+            if !cell.polygon.is_empty() {
+                each(plane, &cell.polygon);
+            }
+        }
     }
 
     /// The planes that the envelope can have between two y, by falling slope.
@@ -164,47 +207,50 @@ impl Planes {
     }
 }
 
-/// What plane `index` keeps of `domain`: where it is the lowest.
-///
-/// Others are tried outward in the order of slopes. With the polygon inside a disc of radius rho
-/// about c, plane j cannot cut while (z_j - z_k)(c) >= |g_j - g_k| rho, which spares most clips.
-fn power_cell(
-    planes: &[Plane],
-    index: usize,
-    domain: &Rect,
-    polygon: &mut Vec<[f64; 2]>,
-    scratch: &mut Vec<[f64; 2]>,
-) {
-    polygon.clear();
-    polygon.extend(domain.corners());
-    let own = planes[index];
-    let (mut centre, mut rho2) = disc(polygon);
-    let mut try_plane = |other: &Plane, polygon: &mut Vec<[f64; 2]>| {
-        let above = other.minus(&own);
-        let at_centre = above.at(centre);
-        let slope2 = above.gradient[0] * above.gradient[0] + above.gradient[1] * above.gradient[1];
-        if at_centre >= 0.0 && at_centre * at_centre >= slope2 * rho2 {
-            return;
-        }
-        let below = own.minus(other);
-        if polygon.iter().all(|&p| below.at(p) <= 0.0) {
-            return;
-        }
-        clip(polygon, &below, scratch);
-        (centre, rho2) = disc(polygon);
-    };
-    let (mut before, mut after) = (index, index + 1);
-    while before > 0 || after < planes.len() {
-        if before > 0 {
-            before -= 1;
-            try_plane(&planes[before], polygon);
-        }
-        if after < planes.len() {
-            try_plane(&planes[after], polygon);
-            after += 1;
-        }
-        if polygon.is_empty() {
-            return;
+/// The others by rising distance in the order of slopes.
+fn outward(index: usize, count: usize) -> impl Iterator<Item = usize> {
+    (1..count).flat_map(move |by| {
+        let after = index + by;
+        [index.checked_sub(by), (after < count).then_some(after)].into_iter().flatten()
+    })
+}
+
+/// What a plane keeps of a domain: where it is the lowest.
+#[derive(Default)]
+struct PowerCell {
+    polygon: Vec<[f64; 2]>,
+    /// The planes that cut something off.
+    cut_by: Vec<usize>,
+    scratch: Vec<[f64; 2]>,
+}
+
+impl PowerCell {
+    /// Tries the others in their order. With the polygon inside a disc of radius rho about c, plane j cannot cut while
+    /// (z_j - z_k)(c) >= |g_j - g_k| rho, which spares most clips.
+    fn of(&mut self, planes: &[Plane], index: usize, domain: &Rect, others: impl Iterator<Item = usize>) {
+        let PowerCell { polygon, cut_by, scratch } = self;
+        cut_by.clear();
+        polygon.clear();
+        polygon.extend(domain.corners());
+        let own = planes[index];
+        let (mut centre, mut rho2) = disc(polygon);
+        for other in others {
+            let above = planes[other].minus(&own);
+            let at_centre = above.at(centre);
+            let slope2 = above.gradient[0] * above.gradient[0] + above.gradient[1] * above.gradient[1];
+            if at_centre >= 0.0 && at_centre * at_centre >= slope2 * rho2 {
+                continue;
+            }
+            let below = own.minus(&planes[other]);
+            if polygon.iter().all(|&p| below.at(p) <= 0.0) {
+                continue;
+            }
+            clip(polygon, &below, scratch);
+            cut_by.push(other);
+            if polygon.is_empty() {
+                return;
+            }
+            (centre, rho2) = disc(polygon);
         }
     }
 }
@@ -258,6 +304,45 @@ pub(super) fn along_row(planes: &[Plane], y: f64, pieces: &mut Vec<Piece>) {
         }
         if !start.is_nan() {
             pieces.push(Piece { start, slope, intercept });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Gradients on a coarse grid, so that planes are parallel, meet in one line or are nowhere the lowest.
+        #[test]
+        fn a_part_is_cut_by_no_others_than_the_whole(
+            planes in proptest::collection::vec((-3..4i32, -3..4i32, 0..6i32), 1..40),
+            low in proptest::array::uniform2(-1.0..0.5f64),
+            size in proptest::array::uniform2(0.05..0.5f64),
+        ) {
+            let plane = |&(gx, gy, c): &(i32, i32, i32)| {
+                let gradient = [f64::from(gx) * 0.1, f64::from(gy) * 0.1];
+                Plane { gradient, offset: f64::from(c) * 0.05 + 2.0 * gradient[0].hypot(gradient[1]).powi(2) }
+            };
+            let planes: Vec<Plane> = planes.iter().map(plane).collect();
+            let whole = Planes::of(planes.clone(), &Rect::square(1.0), |_, _| {});
+            let part = Rect { low, high: [low[0] + size[0], low[1] + size[1]] };
+            let (mut by_part, mut by_whole) = (Vec::new(), Vec::new());
+            Planes::of(planes, &part, |plane, polygon| by_part.push((*plane, doubled_area(polygon))));
+            whole.polygons(&part, |plane, polygon| by_whole.push((*plane, doubled_area(polygon))));
+            // What is but a line or a point, one may have and the other not.
+            for areas in [&mut by_part, &mut by_whole] {
+                areas.retain(|(_, area)| *area > 1e-9);
+            }
+            prop_assert_eq!(by_part.len(), by_whole.len());
+            for (a, b) in by_part.iter().zip(&by_whole) {
+                prop_assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-12, "{:?} and {:?}", a, b);
+            }
+            let all: f64 = by_whole.iter().map(|(_, area)| area).sum();
+            prop_assert!((all - 2.0 * size[0] * size[1]).abs() < 1e-9, "{}", all);
         }
     }
 }

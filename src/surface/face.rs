@@ -1,7 +1,7 @@
 //! The facets of a designed surface as polygons, and the walls between its cells.
 
 use super::Designed;
-use super::envelope::{Plane, Planes, Rect, clip, clip_to, doubled_area};
+use super::envelope::{Plane, Rect, clip, clip_to, doubled_area};
 use crate::screen::{CellRange, Seam};
 
 /// A planar piece of a designed surface.
@@ -45,16 +45,15 @@ impl Designed {
             .iter()
             .map(|(cell, centre)| {
                 let domain = seen.moved([-centre[0], -centre[1]]);
-                polygons(cell.planes.all(), &domain)
-                    .into_iter()
-                    .map(|(plane, polygon)| {
-                        let [dx, dy] = around(*centre);
-                        let polygon = polygon.into_iter().map(|p| [p[0] - dx, p[1] - dy]).collect();
-                        let offset =
-                            plane.offset + plane.gradient[0] * dx + plane.gradient[1] * dy + cell.elevation;
-                        (Plane { offset, ..plane }, polygon)
-                    })
-                    .collect()
+                let [dx, dy] = around(*centre);
+                let mut all = Vec::with_capacity(cell.planes.all().len());
+                cell.planes.polygons(&domain, |plane, polygon| {
+                    let polygon = polygon.iter().map(|p| [p[0] - dx, p[1] - dy]).collect();
+                    let offset =
+                        plane.offset + plane.gradient[0] * dx + plane.gradient[1] * dy + cell.elevation;
+                    all.push((Plane { offset, ..*plane }, polygon));
+                });
+                all
             })
             .collect();
         for (index, function) in functions.iter().enumerate() {
@@ -100,13 +99,6 @@ impl Designed {
         }
         walls
     }
-}
-
-/// The polygons of an envelope inside a rectangle, counter-clockwise.
-fn polygons(planes: &[Plane], domain: &Rect) -> Vec<(Plane, Vec<[f64; 2]>)> {
-    let mut out = Vec::new();
-    Planes::of(planes.to_vec(), domain, |plane, polygon| out.push((*plane, polygon.to_vec())));
-    out
 }
 
 /// The parts of `polygon` in which `plane` is not below the envelope of `rival`: the polygon less
