@@ -61,13 +61,16 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
             checked.deviation_mm
         );
         if let Some(fraction) = checked.looked_at_fraction {
+            let all_under_the_set = arguments.share.is_none() && checked.smallest_set.is_some();
+            let errors = checked.cutters.iter().any(|reach| reach.standard_error.is_some());
             println!(
-                "{:.1} % of the area was looked at{}: the deepest is the deepest there, and after +- stands a standard error",
+                "{:.1} % of the area was looked at{}: the deepest is the deepest there, and {}",
                 100.0 * fraction,
-                // A share of one square has no standard error either.
-                match (arguments.share, &checked.smallest_set) {
-                    (None, Some(_)) => " under each cutter, all of it under the set",
-                    _ => "",
+                if all_under_the_set { " under each cutter, all of it under the set" } else { "" },
+                if errors {
+                    "after +- stands a standard error"
+                } else {
+                    "one square alone has no standard error"
                 }
             );
         }

@@ -59,8 +59,9 @@ pub fn of_motions(shop: &Shop, result: &TileResult, post: usize, index: usize) -
         found.push(Remark::new(Severity::Error, "clamp", Some(motions[met.motion].line), message).at(&place));
     }
     if let Some(hit) = body_hit {
+        let longer = if hit.what == "holder" { "that sticks out further" } else { "with a longer neck" };
         let message = format!(
-            "the {} of {} is {:.3} mm too deep in the metal beside the cutter; hint: a tool with a longer neck, an operation that clears more before it, or level = \"plane\"",
+            "the {} of {} is {:.3} mm too deep in the metal beside the cutter; hint: a tool {longer}, an operation that clears more before it, or level = \"plane\"",
             hit.what, tool.name, hit.depth_mm
         );
         let place = result.in_part([hit.at_mm[0], hit.at_mm[1]]);
