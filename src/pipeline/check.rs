@@ -350,6 +350,7 @@ impl Facts<'_> {
 
     fn write_maps(&self, set: &[usize], out: &Path, progress: &dyn Progress) -> Result<(), Error> {
         for tile in self.tiles {
+            tile.piece.hold()?;
             let surface = tile.surface();
             let lattice = surface.lattice();
             let mut map = maps::CavityMap::create(out, &tile.setup.tile.name, &lattice, self.job.maps.full)?;
@@ -376,6 +377,7 @@ impl Facts<'_> {
                 lattice.step_mm * 1e3
             );
             map.finish(&self.job.name, [at.x_mm, at.y_mm], note)?;
+            self.done(tile);
         }
         Ok(())
     }

@@ -74,6 +74,7 @@ pub fn mill(job: &Job, folder: &Path, staging: &Path, progress: &dyn Progress) -
     let tiles = setups(job, &shop, &part)?;
     let mut results = Vec::new();
     for tile in tiles {
+        tile.piece.hold()?;
         let mut posts = Vec::new();
         for dialect in &shop.dialects {
             posts.push(plan::programs(job, &shop, &tile, dialect, staging, progress)?);
@@ -84,6 +85,7 @@ pub fn mill(job: &Job, folder: &Path, staging: &Path, progress: &dyn Progress) -
         for program in result.posts.iter_mut().flat_map(|post| &mut post.programs) {
             program.reading.motions = Vec::new();
         }
+        result.tile.piece.shed();
         results.push(result);
     }
     report::finish(job, &shop, &part, results, staging)
@@ -153,6 +155,9 @@ pub fn setups(job: &Job, shop: &Shop, part: &Part) -> Result<Vec<TileSetup>, Err
             }
             let stroke = machine::ZNeed { depth_mm: cut_mm, top_allowance_mm: 0.0, ..need };
             machine::fits_z(&setup.setup.tile.name, stroke, &shop.machine)?;
+        }
+        if tiles.len() > 1 {
+            setup.piece.shed();
         }
         setups.push(setup);
     }

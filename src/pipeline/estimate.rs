@@ -50,7 +50,9 @@ pub fn estimate(
         ..Estimated::default()
     };
     for tile in &tiles {
+        tile.piece.hold()?;
         let planned = plan::programs(job, &shop, tile, dialect, scratch, progress)?;
+        tile.piece.shed();
         for program in &planned.programs {
             let tool = &shop.tools[program.operation].name;
             let kind = job.operations[program.operation].kind.word();

@@ -79,6 +79,13 @@ impl Facts<'_> {
         self.tiles.iter().flat_map(windows).map(|window: Window| window.samples() as u64).sum()
     }
 
+    /// Lets go what is held of a tile, unless it is the only one.
+    pub(super) fn done(&self, tile: &TileSetup) {
+        if self.tiles.len() > 1 {
+            tile.piece.shed();
+        }
+    }
+
     /// The windows of a tile that are looked at, in groups.
     fn windows(&self, tile: &TileSetup) -> Vec<Vec<Window>> {
         let lattice = tile.surface().lattice();
@@ -103,6 +110,7 @@ impl Facts<'_> {
             designed: LightTally::default(),
         };
         for tile in self.tiles {
+            tile.piece.hold()?;
             let sight = self.sight(tile);
             for row in self.windows(tile) {
                 let measured: Vec<_> = row
@@ -124,6 +132,7 @@ impl Facts<'_> {
                     of.designed.merge(&light);
                 }
             }
+            self.done(tile);
         }
         Ok(of)
     }

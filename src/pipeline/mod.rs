@@ -14,6 +14,7 @@ mod cut;
 mod error;
 mod estimate;
 mod judge;
+mod levelled;
 mod light;
 mod machine_calibration;
 mod maps;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::Error;
+use super::levelled::Levelled;
 use crate::fidelity::light::Pose;
 use crate::grid::Window;
 use crate::job::{Blanks, Edge, Form, Job, Level, Unit, Up};
@@ -46,6 +47,8 @@ pub struct Undercuts {
 /// The surface of one tile in its own frame, and how it lies in the part.
 pub struct TileSurface {
     pub surface: Arc<dyn Surface>,
+    /// What of it need not be held all the time.
+    levelled: Option<Arc<Levelled>>,
     /// Wedge angles about X and Y that mount it.
     pub wedge_deg: [f64; 2],
     pub undercuts: Option<Undercuts>,
@@ -53,6 +56,23 @@ pub struct TileSurface {
     /// rotation . p + origin.
     pub rotation: DMat3,
     pub origin_mm: DVec3,
+}
+
+impl TileSurface {
+    /// Has ready what [`TileSurface::shed`] let go.
+    pub fn hold(&self) -> Result<(), Error> {
+        if let Some(levelled) = &self.levelled {
+            levelled.hold()?;
+        }
+        Ok(())
+    }
+
+    /// Lets go what is as large as the tile and can be made again.
+    pub fn shed(&self) {
+        if let Some(levelled) = &self.levelled {
+            levelled.shed();
+        }
+    }
 }
 
 impl Part {
@@ -194,6 +214,7 @@ impl Part {
         let mut undercut = self.undercuts;
         let mut rotation = DMat3::IDENTITY;
         let mut shift_mm = DVec3::ZERO;
+        let mut levelled = None;
         let surface: Arc<dyn Surface> = match &self.design {
             Some(design) if self.turned.is_none() && !(one_sheet && job.part.edge == Edge::Wall) => {
                 let cell_mm = design.cell_mm;
@@ -207,7 +228,8 @@ impl Part {
                 let size_mm = [tile.width_mm, tile.height_mm];
                 let piece = Designed::new(Arc::clone(design), material, [x_mm, tile.y_mm], size_mm, step_mm)?;
                 let piece: Arc<dyn Surface> = if job.part.level == Level::Plane {
-                    let level = piece.levelled()?;
+                    let flat = piece;
+                    let level = flat.levelled()?;
                     wedge_deg = wedge(job, &level);
                     undercut = undercuts(&level);
                     rotation = back(&level);
@@ -222,7 +244,9 @@ impl Part {
                             - rotation.transpose() * DVec3::new(tile.width_mm, 0.0, 0.0)
                             + about * shift_mm;
                     }
-                    Arc::new(level.surface)
+                    let turned = Arc::new(Levelled::new(flat, level));
+                    levelled = Some(Arc::clone(&turned));
+                    turned
                 } else {
                     Arc::new(piece)
                 };
@@ -241,7 +265,7 @@ impl Part {
             }
             _ => surface,
         };
-        Ok(TileSurface { surface, wedge_deg, undercuts: undercut, rotation, origin_mm })
+        Ok(TileSurface { surface, levelled, wedge_deg, undercuts: undercut, rotation, origin_mm })
     }
 
     /// A tile on whole samples of the part, with its neighbours if it is one sheet.
