@@ -114,19 +114,19 @@ impl Reducer {
             cavity: out_cavity,
             ..
         } = &mut self.row;
-        for (block, (design, machined)) in
-            design.chunks(self.factor).zip(machined.chunks(self.factor)).enumerate()
-        {
+        let held = out_design.iter_mut().zip(out_machined).zip(out_deviation);
+        let blocks = design.chunks(self.factor).zip(machined.chunks(self.factor));
+        for (((out_design, out_machined), out_deviation), (design, machined)) in held.zip(blocks) {
+            let mut most = (*out_design, *out_machined, *out_deviation);
+            // Which sample is the largest is as good as random: chosen without a jump.
             for (&design, &machined) in design.iter().zip(machined) {
                 let deviation = (f64::from(machined) - f64::from(design)) as f32;
-                let held = out_deviation[block];
-                let first = held.is_nan() && (!deviation.is_nan() || out_design[block].is_nan());
-                if first || deviation.abs() > held.abs() {
-                    out_design[block] = design;
-                    out_machined[block] = machined;
-                    out_deviation[block] = deviation;
-                }
+                let first = most.2.is_nan() & (!deviation.is_nan() | most.0.is_nan());
+                let larger = first | (deviation.abs() > most.2.abs());
+                let this = (design, machined, deviation);
+                most = std::hint::select_unpredictable(larger, this, most);
             }
+            (*out_design, *out_machined, *out_deviation) = most;
         }
         for (out, cavity) in out_cavity.iter_mut().zip(cavity.chunks(self.factor)) {
             // f32::max passes over NaN.
