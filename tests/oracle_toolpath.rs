@@ -7,7 +7,7 @@ use curves::strays;
 use proptest::prelude::*;
 use relief::{Relief, Stock, assert_rules, site};
 use screenmill::grid::{Heights, Lattice, Window};
-use screenmill::surface::Surface;
+use screenmill::surface::{Surface, Walled};
 use screenmill::toolpath::finish::{self, Pattern, Spacing};
 use screenmill::toolpath::{Axis, Kind, Site, Toolpath, rough};
 
@@ -130,6 +130,42 @@ fn what_stands_between_the_samples_is_not_gouged() {
                 let least = stock.deviation(&fine).iter().map(|d| d.2).fold(f64::INFINITY, f64::min);
                 assert!(least >= leave_mm - GOUGE - FLOAT, "{cutter}, {turned}: {least} of {leave_mm}");
             }
+        }
+    }
+}
+
+/// The wall's own edge lies between two samples.
+#[test]
+fn a_wall_around_a_part_stands_up_to_its_edge() {
+    for (i, cutter) in ["ball:0.2", "flat:0.16", "bull:0.2:0.04"].into_iter().enumerate() {
+        let part = |step_mm: f64| Relief::new([0.5, 0.4], step_mm, [0.1, 0.0], |x, _| 0.1 * x);
+        let relief = part(STEP);
+        let open = site(&relief, [0.0001, 0.01, 0.001][i], 0.0);
+        let walled = Walled::new(&relief, relief.top_mm + open.top_allowance_mm);
+        let site = Site { surface: &walled, ..open };
+        let finish = finish::Params { direction_deg: [0.0, 90.0, 30.0][i], ..params(cutter, 0.05) };
+        let rough = rough_params("flat:0.2");
+        for (path, shape) in [
+            (plan(&site, &finish), finish.shape),
+            (rough::rough(&site, &rough, &|_| ()).unwrap(), rough.shape),
+        ] {
+            let fine = part(0.2 * STEP);
+            let over = Site { margin_mm: 0.1, ..self::site(&fine, site.unit_mm, 0.0) };
+            let mut stock = Stock::blank(&over);
+            stock.cut(&over, shape, &path, 0.002, 0.0);
+            let lattice = fine.lattice;
+            let (mut least, mut cut) = (f64::INFINITY, false);
+            for (at, z_mm) in stock.z_mm.iter().enumerate() {
+                let (row, column) =
+                    (at as i64 / stock.columns - stock.margin, at as i64 % stock.columns - stock.margin);
+                let inside =
+                    (0..lattice.rows as i64).contains(&row) && (0..lattice.columns as i64).contains(&column);
+                cut |= inside && *z_mm < site.top_allowance_mm;
+                if !inside {
+                    least = least.min(*z_mm);
+                }
+            }
+            assert!(cut && least >= site.top_allowance_mm - GOUGE - FLOAT, "{cutter}: {least}");
         }
     }
 }

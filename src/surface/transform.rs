@@ -102,6 +102,28 @@ impl<S: Surface> Surface for Walled<S> {
         }
         Ok(out)
     }
+
+    /// Those of the part, and what of the wall's top is asked for: up to the part's edge, which samples only come near.
+    fn outlines(&self, low_mm: [f64; 2], high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
+        let [low, high] = [low_mm, high_mm];
+        let size = [self.lattice().width_mm, self.lattice().height_mm];
+        let inside = [0, 1].map(|axis| [low[axis].max(0.0), high[axis].min(size[axis])]);
+        let across = [low[1], high[1]];
+        let sides = [
+            ([low[0], high[0].min(0.0)], across),
+            ([low[0].max(size[0]), high[0]], across),
+            (inside[0], [low[1], high[1].min(0.0)]),
+            (inside[0], [low[1].max(size[1]), high[1]]),
+        ];
+        let mut outlines = self.inner.outlines(low, high);
+        for ([left, right], [front, back]) in sides {
+            if left < right && front < back {
+                let corners = [[left, front], [right, front], [right, back], [left, back]];
+                outlines.push(corners.map(|[x, y]| [x, y, self.z_mm]).to_vec());
+            }
+        }
+        outlines
+    }
 }
 
 /// A rectangle of whole samples of another surface, its lower left sample at column 0, row 0.
