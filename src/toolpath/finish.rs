@@ -354,11 +354,11 @@ fn pass(
                 };
                 // A finer grid ends beside its line, where the coarsest does, and goes along it from the next position on.
                 let last = end - i - 1;
-                let parts = match layout.slope != 0.0 && site.times() > 1 && last > 1 {
-                    true => vec![0..1, 1..last, last..last + 1],
-                    false => vec![0..last + 1],
+                let cuts = match layout.slope != 0.0 && site.times() > 1 && last > 1 {
+                    true => vec![0, 1, last, last + 1],
+                    false => vec![0, last + 1],
                 };
-                let parts = parts.into_iter().map(|part| (part.start, lay(part)));
+                let parts = cuts.windows(2).map(|cut| (cut[0], lay(cut[0]..cut[1])));
                 let vertices: Vec<(usize, i32)> = parts
                     .flat_map(|(first, vertices)| vertices.into_iter().map(move |(at, z)| (first + at, z)))
                     .collect();
