@@ -216,36 +216,37 @@ fn finish(h: &Heights, every: usize, with_closing: bool, band: &mut Band) {
     let columns = h.window.columns;
     let Band { row, rows, samples, cl, closing, residual } = band;
     let first = *row;
-    let samples_of = |z: &[f32]| z.iter().map(|z| u32::from(!z.is_nan())).sum::<u32>() as u64;
-    let row_of = |chunk: usize, k: usize| h.row((first + chunk * ROWS + k) as i64);
+    let row_of = |k: usize| h.row((first + k) as i64);
+    let samples_of = |k: usize| row_of(k).iter().map(|z| u32::from(!z.is_nan())).sum::<u32>();
+    let of_rows: Vec<u32> = (0..*rows).into_par_iter().with_min_len(ROWS).map(samples_of).collect();
+    *samples = of_rows.iter().map(|&samples| u64::from(samples)).sum();
+    let is_whole = |k: usize| of_rows[k] as usize == columns;
     cl.par_chunks_mut(ROWS * columns).enumerate().for_each(|(chunk, cl)| {
         for (k, cl) in cl.chunks_exact_mut(columns).enumerate() {
-            mask(cl, h.row((first + (chunk * ROWS + k) * every) as i64));
+            let k = (chunk * ROWS + k) * every;
+            if !is_whole(k) {
+                mask(cl, row_of(k));
+            }
         }
     });
     if !with_closing {
-        let counts = (0..*rows).into_par_iter().with_min_len(ROWS);
-        *samples = counts.map(|k| samples_of(h.row((first + k) as i64))).sum();
         return;
     }
     untouched(residual, *rows * columns);
     let chunks = closing.par_chunks_mut(ROWS * columns).zip(residual.par_chunks_mut(ROWS * columns));
-    *samples = chunks
-        .enumerate()
-        .map(|(chunk, (closing, residual))| {
-            let mut samples = 0;
-            let rows = closing.chunks_exact_mut(columns).zip(residual.chunks_exact_mut(columns));
-            for (k, (closing, residual)) in rows.enumerate() {
-                let h = row_of(chunk, k);
-                samples += samples_of(h);
+    chunks.enumerate().for_each(|(chunk, (closing, residual))| {
+        let rows = closing.chunks_exact_mut(columns).zip(residual.chunks_exact_mut(columns));
+        for (k, (closing, residual)) in rows.enumerate() {
+            let k = chunk * ROWS + k;
+            let h = row_of(k);
+            if !is_whole(k) {
                 mask(closing, h);
-                for ((residual, closing), h) in residual.iter_mut().zip(closing.iter()).zip(h) {
-                    *residual = left(*closing, *h);
-                }
             }
-            samples
-        })
-        .sum();
+            for ((residual, closing), h) in residual.iter_mut().zip(closing.iter()).zip(h) {
+                *residual = left(*closing, *h);
+            }
+        }
+    });
 }
 
 /// No data where the part has none.

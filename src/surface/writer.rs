@@ -116,12 +116,9 @@ impl HeightWriter {
         assert!(self.given + rows <= self.rows, "no more rows than announced");
         let io = |source| Error::Unwritable { path: self.name.clone(), source };
         let lines = z_mm.chunks_exact(self.columns);
-        self.buffer.clear();
         match &mut self.format {
             Format::Tiff { data } => {
-                for line in lines.rev() {
-                    put_floats(line, &mut self.buffer, f32::to_le_bytes);
-                }
+                put_floats(lines.rev(), &mut self.buffer, rows * columns, f32::to_le_bytes);
                 let row = (self.rows - self.given - rows) as u64;
                 let place = *data + row * self.columns as u64 * 4;
                 let file = self.file.file_mut();
@@ -129,13 +126,12 @@ impl HeightWriter {
                 file.write_all(&self.buffer).map_err(io)?;
             }
             Format::Npy => {
-                for line in lines {
-                    put_floats(line, &mut self.buffer, f32::to_ne_bytes);
-                }
+                put_floats(lines, &mut self.buffer, rows * columns, f32::to_ne_bytes);
                 self.file.write_all(&self.buffer).map_err(io)?;
             }
             Format::Png { z_range_mm: [low, high], values } => {
                 let scale = 65535.0 / (*high - *low);
+                self.buffer.clear();
                 for (index, line) in lines.enumerate() {
                     for (column, &z_mm) in line.iter().enumerate() {
                         let path = || self.name.clone();
@@ -191,11 +187,21 @@ enum Kind {
 }
 
 /// No data has one spelling, whatever sign arithmetic gave it.
-fn put_floats(line: &[f32], out: &mut Vec<u8>, to: impl Fn(f32) -> [u8; 4]) {
-    let start = out.len();
-    out.resize(start + 4 * line.len(), 0);
-    for (bytes, &z) in out[start..].as_chunks_mut().0.iter_mut().zip(line) {
-        *bytes = to(if z.is_nan() { f32::NAN } else { z });
+fn put_floats<'a>(
+    lines: impl Iterator<Item = &'a [f32]>,
+    out: &mut Vec<u8>,
+    count: usize,
+    to: impl Fn(f32) -> [u8; 4],
+) {
+    // Written over, not filled with zeros first.
+    out.resize(4 * count, 0);
+    let mut left = out.as_chunks_mut().0;
+    for line in lines {
+        let (bytes, after) = left.split_at_mut(line.len());
+        for (bytes, &z) in bytes.iter_mut().zip(line) {
+            *bytes = to(if z.is_nan() { f32::NAN } else { z });
+        }
+        left = after;
     }
 }
 
