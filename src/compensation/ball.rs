@@ -3,6 +3,7 @@ use super::field::Field;
 use super::lanes::{LANES, NONE};
 use super::rolling::WIDE;
 use super::slopes::Rises;
+use super::sweep::Moderate;
 
 /// Offsets d (sample less axis, in samples) at which samples can touch a ball: a box.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +46,7 @@ const ROOM: f64 = 0.01;
 
 /// The greater of two numbers; f64::max also looks for NaN, which costs a tenth of the whole search.
 #[inline(always)]
-fn greater(a: f64, b: f64) -> f64 {
+pub(super) fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
@@ -81,9 +82,11 @@ impl Ball {
     /// dx >= g Zb - m/2 with Zb the mean of the two Z, and likewise from the one before. Zb is
     /// bounded from the box, which shrinks in a few sweeps.
     #[inline(always)]
-    pub fn reachable(&self, rises: &Rises) -> Option<Reachable> {
+    pub fn reachable(&self, rises: &Rises, moderate: Option<&Moderate>) -> Option<Reachable> {
         let slopes = self.slopes(rises, 1.0);
-        self.narrowed(self.start_of(&slopes), &slopes)
+        let of = [slopes.x_next, slopes.x_before, slopes.y_next, slopes.y_before];
+        let at = moderate.and_then(|moderate| moderate.around(of));
+        self.narrowed(at.unwrap_or_else(|| self.start_of(&slopes)), &slopes)
     }
 
     /// As [`Ball::reachable`], of offsets within a box only.

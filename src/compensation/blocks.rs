@@ -273,6 +273,27 @@ impl Lanes {
     }
 }
 
+/// The most by which the rises to and from any sample of a block differ along an axis, where it bends downwards.
+#[inline(always)]
+pub(super) fn bend<V: Vectors>(field: &Field, block: Block) -> f32 {
+    let i = PAD + block.first;
+    let mut z = V::load(group(field.row(block.a), i));
+    let mut from_below = V::subtract(z, V::load(group(field.row(block.a - 1), i)));
+    let mut most = V::splat(f32::MIN);
+    for r in 0..block.rows {
+        let row = field.row(block.a + r as i64);
+        let above = V::load(group(field.row(block.a + r as i64 + 1), i));
+        let to_above = V::subtract(above, z);
+        let x_next = V::subtract(V::load(group(row, i + 1)), z);
+        let x_before = V::subtract(z, V::load(group(row, i - 1)));
+        let bends = V::greater(V::subtract(x_before, x_next), V::subtract(from_below, to_above));
+        most = V::greater(most, bends);
+        z = above;
+        from_below = to_above;
+    }
+    V::most(most)
+}
+
 /// Where a neighbour lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Side {

@@ -14,7 +14,7 @@
 
 use super::Profile;
 use super::ball::{Ball, Reachable};
-use super::blocks::{Block, Lanes, ROWS, measure};
+use super::blocks::{Block, Lanes, ROWS, bend, measure};
 use super::cones::Cones;
 use super::feed::Feed;
 use super::field::{Field, PAD, Targets};
@@ -40,10 +40,10 @@ const ALLOWANCE: f64 = 0.05;
 /// Samples of a block that share offsets, at least, for these to be looked for.
 pub(super) const MANY: u32 = 12;
 
-/// How far the rises of samples on one facet may differ, and of those of a block that are taken at once, in those that
-/// are alike.
+/// How far the rises of samples on one facet may differ, in those that are alike, and those of each sample of a block
+/// of an even bend.
 const FACET: f32 = 4.0;
-const SPREAD: f32 = 35.0;
+const EVEN: f32 = 8.0;
 
 /// Samples of a block on a facet that is known already, at least, to be taken at once.
 const SOME: u32 = 2;
@@ -53,10 +53,15 @@ pub(super) trait Touch<V: Vectors, P: Pairs> {
     /// Offsets at which all samples with the same rises can touch.
     type At: Copy;
 
+    /// How far the rises of a block that is taken at once may differ, in those that are alike, and where it has no edge.
+    const SPREAD: f32;
+    const EVEN_SPREAD: f32;
+
     fn nowhere(&self) -> Self::At;
 
-    /// Those of samples with these rises, if they are few, and whether they are so few that samples share a facet.
-    fn few(&self, rises: &Rises) -> Option<(Self::At, bool)>;
+    /// Those of samples with these rises, if they are few, and whether they are so few that samples share a facet. More
+    /// are few where the surface bends evenly, for then all samples touch.
+    fn few(&self, rises: &Rises, is_even: bool) -> Option<(Self::At, bool)>;
 
     /// Offsets along y, at least, at which samples with these rises can touch.
     fn rows(&self, rises: &Rises) -> [f64; 2];
@@ -278,7 +283,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
             } else {
                 let (all, grain_mm) = (measured.rises(), self.grain_mm(block));
                 of_edge = Some((all, grain_mm));
-                self.facet(&all, grain_mm)
+                self.facet(Some(block), &all, grain_mm)
             };
             self.raise_level(a, rows, &mut level, out);
             match known {
@@ -309,15 +314,22 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
         if size < -LEAST { size * f32::EPSILON } else { 0.0 }
     }
 
-    /// The offsets of a block, if they are few.
+    /// The offsets of samples with these rises, if they are few; `of` a block, if they are all those of one.
     #[inline(always)]
-    fn facet(&self, all: &Rises, grain_mm: f32) -> Option<Known<T::At>> {
-        if all.spread() > SPREAD * self.alike_mm {
+    fn facet(&self, of: Option<Block>, all: &Rises, grain_mm: f32) -> Option<Known<T::At>> {
+        let spread = all.spread();
+        if spread > T::EVEN_SPREAD * self.alike_mm {
+            return None;
+        }
+        let is_even = spread > T::SPREAD * self.alike_mm;
+        if is_even
+            && !of.is_some_and(|block| bend::<V>(self.field, block) <= EVEN * self.alike_mm + 4.0 * grain_mm)
+        {
             return None;
         }
         let rises = all.wider(greater(0.12 * self.alike_mm, grain_mm));
-        let alike = all.spread() <= FACET * self.alike_mm;
-        self.touch.few(&rises).map(|(at, few)| Known { rises, at, is_facet: few && alike })
+        let alike = spread <= FACET * self.alike_mm;
+        self.touch.few(&rises, is_even).map(|(at, few)| Known { rises, at, is_facet: few && alike })
     }
 
     /// Whether samples of this block may reach any target.
@@ -418,7 +430,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 bits &= bits - 1;
             }
             let seed = self.lanes.at(r, bits.trailing_zeros() as usize);
-            let Some(known) = self.facet(&seed, grain_mm).filter(|known| known.is_facet) else { break };
+            let Some(known) = self.facet(None, &seed, grain_mm).filter(|known| known.is_facet) else { break };
             let held = self.lanes.held::<V>(left, &known.rises);
             let count = count(&held);
             for (left, held) in left.iter_mut().zip(&held) {

@@ -112,7 +112,7 @@ impl<V: Vectors> Rolling<V> {
         these: &[u16; ROWS],
         drop: Option<Side>,
     ) -> Option<Reachable> {
-        let at = self.ball.reachable(rises)?;
+        let at = self.ball.reachable(rises, self.moderate.as_ref())?;
         let Some(side) = drop else { return Some(at) };
         let rise_mm = match side {
             Side::Right => rises.x_next,

@@ -128,6 +128,8 @@ impl<'a, V: Vectors> Listed<'a, V> {
 
 impl<V: Vectors, P: Pairs> Touch<V, P> for Listed<'_, V> {
     type At = Spots;
+    const SPREAD: f32 = 35.0;
+    const EVEN_SPREAD: f32 = 35.0;
 
     #[inline(always)]
     fn nowhere(&self) -> Spots {
@@ -135,7 +137,7 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Listed<'_, V> {
     }
 
     #[inline(always)]
-    fn few(&self, rises: &Rises) -> Option<(Spots, bool)> {
+    fn few(&self, rises: &Rises, _: bool) -> Option<(Spots, bool)> {
         let mut spots = NOWHERE;
         let slopes = self.cones.slopes(rises);
         let Some(around) = self.cones.around(&slopes) else { return Some((spots, true)) };

@@ -12,7 +12,9 @@ use super::interval::Beside;
 use super::lanes::{LANES, Vectors};
 use super::pairs::{OnSamples, Pairs};
 use super::rim::RowBounds;
-use super::runs::{BoxRows, Offsets, Run, Span, raise_narrow, raise_rows, raise_run, raise_spans, row_work};
+use super::runs::{
+    BoxRows, Offsets, Run, Span, raise_narrow, raise_pair, raise_rows, raise_run, raise_spans, row_work,
+};
 use super::slopes::Rises;
 use super::sweep::Moderate;
 
@@ -34,7 +36,10 @@ pub(super) const WIDE: f64 = 100.0;
 const FEW: f64 = 9.0;
 
 /// The same for a block with an edge in it to be taken at once: splitting it is about as much work.
-const BLUNT: f64 = 100.0;
+const BLUNT: f64 = 80.0;
+
+/// The same for a block of an even bend: all its samples can touch.
+const EVEN: f64 = 250.0;
 
 /// Columns of such a box at most: the padding of a field holds a tile and as much again.
 const WIDEST: f64 = 2.0 * LANES as f64;
@@ -60,6 +65,8 @@ pub(super) struct Rolling<V: Vectors> {
 
 impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
     type At = Reachable;
+    const SPREAD: f32 = 24.0;
+    const EVEN_SPREAD: f32 = 80.0;
 
     #[inline(always)]
     fn nowhere(&self) -> Reachable {
@@ -67,12 +74,12 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
     }
 
     #[inline(always)]
-    fn few(&self, rises: &Rises) -> Option<(Reachable, bool)> {
-        match self.ball.reachable(rises) {
+    fn few(&self, rises: &Rises, is_even: bool) -> Option<(Reachable, bool)> {
+        match self.ball.reachable(rises, self.moderate.as_ref()) {
             None => Some((Reachable { x: [1.0, 0.0], y: [1.0, 0.0] }, true)),
             Some(at) => {
                 let points = at.lattice_points();
-                let fits = points <= BLUNT && at.x[1] - at.x[0] <= WIDEST;
+                let fits = points <= if is_even { EVEN } else { BLUNT } && at.x[1] - at.x[0] <= WIDEST;
                 fits.then_some((at, points <= FEW))
             }
         }
@@ -173,7 +180,12 @@ fn raise<V: Vectors, P: Pairs>(
                 return BLOCK_WORK.max(offsets.taps() * spans.len());
             }
         }
-        raise_spans::<V>(on.field, samples, a, spans, &offsets, out);
+        let run = Run { a, first, len };
+        if !(spans.iter().all(|span| *span == spans[0])
+            && raise_pair::<V>(on.field, samples, run, spans.len(), &offsets, out))
+        {
+            raise_spans::<V>(on.field, samples, a, spans, &offsets, out);
+        }
         let taps = offsets.taps() * spans.iter().map(|[_, len]| len).sum::<usize>() / LANES;
         return BLOCK_WORK.max(taps);
     }

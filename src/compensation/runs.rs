@@ -165,6 +165,63 @@ pub(super) fn raise_spans<V: Vectors>(
     }
 }
 
+/// [`raise_spans`] of rows with the same span, at offsets in two rows of the cutter: each target row is read and written
+/// once. False, and nothing done, if they are others.
+#[inline(always)]
+pub(super) fn raise_pair<V: Vectors>(
+    field: &Field,
+    on: &OnSamples,
+    run: Run,
+    rows: usize,
+    at: &Offsets,
+    out: &mut Targets,
+) -> bool {
+    let ([lo, hi], [low, high]) = (at.x, at.y);
+    if high != low + 1 || on.every != 1 || !(lo..=lo + 1).contains(&hi) {
+        return false;
+    }
+    let (Some(one), Some(other)) = (on.stencil.arc(i64::from(low)), on.stencil.arc(i64::from(high))) else {
+        return false;
+    };
+    if lo < one.arc.lo.max(other.arc.lo) || hi > one.arc.hi.min(other.arc.hi) {
+        return false;
+    }
+    let origin = run.first as i64 - on.shift;
+    let start = (origin - i64::from(hi)).max(0) & -(LANES as i64);
+    let end = (origin + run.len as i64 - i64::from(lo)).min(out.columns as i64);
+    if start >= end {
+        return true;
+    }
+    let length = ((end - start) as usize).next_multiple_of(LANES);
+    let from = (PAD as i64 + start + on.shift + i64::from(lo)) as usize;
+    let row = on.input_row + run.a - on.target_row;
+    let first = (row - i64::from(high)).max(0);
+    let last = (row + rows as i64 - 1 - i64::from(low)).min(on.target_rows as i64 - 1);
+    let s = [one.s(lo), other.s(lo), one.s(hi), other.s(hi)].map(V::splat);
+    for b in first..=last {
+        // The rows before and after the block are samples like others.
+        let a = run.a + b - row + i64::from(low);
+        let one = &field.row(a)[from..][..length + 1];
+        let other = &field.row(a + 1)[from..][..length + 1];
+        let to = groups_mut(&mut out.row_mut(b as usize)[start as usize..][..length]);
+        if lo == hi {
+            for ((to, one), other) in to.iter_mut().zip(groups(one)).zip(groups(other)) {
+                let best = V::greater(V::add(V::load(one), s[0]), V::load(to));
+                V::store(V::greater(V::add(V::load(other), s[1]), best), to);
+            }
+        } else {
+            let beside = groups(&one[1..]).iter().zip(groups(&other[1..]));
+            for (((to, one), other), beside) in to.iter_mut().zip(groups(one)).zip(groups(other)).zip(beside)
+            {
+                let best = V::greater(V::add(V::load(one), s[0]), V::load(to));
+                let next = V::greater(V::add(V::load(other), s[1]), V::add(V::load(beside.0), s[2]));
+                V::store(V::greater(V::greater(V::add(V::load(beside.1), s[3]), next), best), to);
+            }
+        }
+    }
+    true
+}
+
 /// The first row of a block, counted from where row 0 belongs to the target `row` (in rows of
 /// samples), that belongs to a target, and this target.
 #[inline(always)]

@@ -1,6 +1,6 @@
 //! Boxes of sixteen samples at once, tightened in turns along both axes.
 
-use super::ball::Ball;
+use super::ball::{Ball, Reachable, greater};
 use super::lanes::Vectors;
 
 #[inline(always)]
@@ -243,6 +243,25 @@ impl Moderate {
             half: (0.5 + ball.room()) as f32,
             sweeps: if radius < 60.0 { 2 } else { 1 },
         })
+    }
+
+    /// A box to sweep, of samples whose mean slopes to their next neighbours are not less than these, and from those
+    /// before not more: along x next and before, along y. None where they are steeper.
+    #[inline(always)]
+    pub fn around(&self, [x_next, x_before, y_next, y_before]: [f64; 4]) -> Option<Reachable> {
+        let (steepest, spread) = (f64::from(self.steepest), f64::from(self.spread));
+        if !(x_next >= -steepest && x_before <= steepest && y_next >= -steepest && y_before <= steepest) {
+            return None;
+        }
+        let nearest = |next: f64, before: f64| greater(greater(next, -before) - spread, 0.0);
+        let farthest = |next: f64, before: f64| greater(before, -next) + spread;
+        let z = |x: f64, y: f64| f64::from(self.radius) / (1.0 + x * x + y * y).sqrt();
+        let z_low = z(farthest(x_next, x_before), farthest(y_next, y_before));
+        let z_high = z(nearest(x_next, x_before), nearest(y_next, y_before));
+        let half = f64::from(self.half);
+        let low = |next: f64| next * if next >= 0.0 { z_low } else { z_high } - half;
+        let high = |before: f64| before * if before >= 0.0 { z_high } else { z_low } + half;
+        Some(Reachable { x: [low(x_next), high(x_before)], y: [low(y_next), high(y_before)] })
     }
 
     /// Boxes to sweep.

@@ -14,6 +14,9 @@ use rayon::prelude::*;
 /// Columns of one tile: its rows stay in a core's cache.
 const TILE_COLUMNS: usize = 2048;
 
+/// Reach of a cutter, in samples, up to which the rows of tiles twice as wide stay there, too.
+const SMALL_REACH: usize = 16;
+
 /// Rows of one tile, at least and at most; a tile reads twice the cutter's reach more.
 const TILE_ROWS: [usize; 2] = [128, 4096];
 
@@ -107,7 +110,11 @@ pub(super) fn on_tiles(
     }
     let profile = tables.profile();
     let (rows, columns) = (out.rows.div_ceil(every), out.columns);
-    let width = strip_columns(columns);
+    let width = if profile.reach() <= SMALL_REACH {
+        evenly(columns, 2 * TILE_COLUMNS)
+    } else {
+        strip_columns(columns)
+    };
     let across = columns.div_ceil(width);
     let least = TILE_ROWS[0].max(4 * profile.reach());
     let share = (out.rows * across).div_ceil(2 * rayon::current_num_threads());
@@ -133,9 +140,14 @@ pub(super) fn on_tiles(
     });
 }
 
-/// Columns of one tile: all about as wide, so that threads have equal shares.
+/// Columns of one strip of a part.
 pub(super) fn strip_columns(columns: usize) -> usize {
-    columns.div_ceil(columns.div_ceil(TILE_COLUMNS)).next_multiple_of(LANES)
+    evenly(columns, TILE_COLUMNS)
+}
+
+/// Columns of tiles that are all about as wide, so that threads have equal shares.
+fn evenly(columns: usize, most: usize) -> usize {
+    columns.div_ceil(columns.div_ceil(most)).next_multiple_of(LANES)
 }
 
 /// What is to be done on each tile: `tile.rows` rows, `every` apart.
