@@ -214,6 +214,22 @@ fn planes_are_few_moves_and_nothing_is_left_but_scallops() {
     }
 }
 
+/// On coarse grids, too, and on fine ones beside them, whose passes follow one curve.
+#[test]
+fn slanted_passes_over_a_plane_are_few_moves() {
+    let relief = Relief::new([0.9, 0.8], STEP, [0.23, 0.17], |x, y| 0.23 * x - 0.17 * y);
+    for (unit_mm, apart_mm) in [(0.025, 0.025), (0.01, 0.01), (0.001, 0.01), (0.0001, 0.01), (0.0001, 0.025)]
+    {
+        for direction_deg in [10.0, 30.0, 73.0] {
+            let site = Site { apart_mm, ..site(&relief, unit_mm, 0.0) };
+            let params = finish::Params { direction_deg, ..params("ball:0.6", 0.05) };
+            let (path, layout) = (plan(&site, &params), finish::layout(&site, &params).unwrap());
+            let each = path.moves.len() as f64 / layout.passes.len() as f64;
+            assert!(each < 12.0, "{unit_mm} beside {apart_mm}, {direction_deg}: {each} moves a pass");
+        }
+    }
+}
+
 #[test]
 fn a_zigzag_over_a_plane_never_retracts() {
     let relief = Relief::new([0.8, 0.6], STEP, [0.3, 0.2], |x, y| 0.3 * x + 0.2 * y);

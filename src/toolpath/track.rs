@@ -15,8 +15,8 @@
 //!
 //! All controllers of a job follow one curve, each on its own grid, and so they follow each other. It is planned on the
 //! coarsest grid among them, with the tightest budget. It is that of the line but where a point of that grid is held:
-//! beside walls, where a place a few micrometres away may lie much higher, in notches that hold no whole unit on either
-//! side, and at both ends. There the curve leads through the point itself, at the height that has to be kept at it, and
+//! beside walls, where a place a few micrometres away may lie much higher, in notches that hold less than a level plane
+//! does on either side, and at both ends. There the curve leads through the point itself, at the height that has to be kept at it, and
 //! the finer grids, of which the coarsest is a part, go there, too.
 //!
 //! Heights are counted from the slope across, z - s a, for stretches of positions where it is the same: there moves
@@ -217,9 +217,11 @@ impl<'a> Run<'a> {
                 heights[i] = heights[i].max(right);
             }
         }
+        // On a level plane, half way between two points; a whole unit unless the grid is much coarser than the budget.
+        let enough = (self.apart(0.5) + self.simplify).min(1.0) - SAME;
         let held = |i: usize| {
             let point = points[i];
-            let holds = !self.steep(i) && point.room() >= 1.0 && i > 0 && i + 1 < count;
+            let holds = !self.steep(i) && point.room() >= enough && i > 0 && i + 1 < count;
             (!holds).then_some(Held { across: point.across, off: point.off, height: heights[i] })
         };
         (0..count).map(held).collect()
