@@ -1,5 +1,6 @@
 use super::field::{Field, PAD};
 use super::lanes::{LANES, LEAST, Vectors, groups};
+use super::runs::Span;
 use super::slopes::Rises;
 
 /// Rows of a block; it is [`LANES`] samples wide.
@@ -336,4 +337,26 @@ pub(super) fn least_rise<V: Vectors>(
         }
     }
     V::least(least)
+}
+
+/// From the first to the last of these samples of a block, row by row.
+#[inline(always)]
+pub(super) fn spans_of(block: Block, bits: &[u16; ROWS]) -> [Span; ROWS] {
+    let mut spans = [[0; 2]; ROWS];
+    for (span, &bits) in spans.iter_mut().zip(bits) {
+        let first = bits.trailing_zeros() as usize;
+        let end = LANES - bits.leading_zeros() as usize;
+        *span = [block.first + first, end.saturating_sub(first)];
+    }
+    spans
+}
+
+/// How many samples of a block these are.
+#[inline(always)]
+pub(super) fn count(bits: &[u16; ROWS]) -> u32 {
+    let mut sum = 0;
+    for bits in bits {
+        sum += bits.count_ones();
+    }
+    sum
 }

@@ -1,7 +1,8 @@
 //! What a cutter leaves at best.
 
 use super::field::Sense;
-use super::tiles::{Way, on_samples_into};
+use super::tiles::on_samples_into;
+use super::way::Way;
 use super::{Profile, Tables};
 use crate::grid::{Heights, Window};
 

@@ -1,9 +1,8 @@
 //! Samples on the edges of facets and of walls, under a ball: those of a block that have a box of offsets in common.
 
 use super::ball::Reachable;
-use super::blocks::{Block, Lanes, ROWS, Side, least_rise};
+use super::blocks::{Block, Lanes, ROWS, Side, count, least_rise};
 use super::bundle::raise_bundle;
-use super::contact::count;
 use super::field::{Field, Targets};
 use super::lanes::{LANES, Vectors, Work};
 use super::pairs::OnSamples;

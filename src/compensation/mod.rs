@@ -44,6 +44,7 @@ mod ridges;
 mod rim;
 mod rolling;
 mod runs;
+mod search;
 mod slopes;
 mod stencil;
 mod stream;
@@ -53,7 +54,10 @@ mod tables;
 mod tiles;
 mod touch;
 mod unboxed;
+mod way;
 mod weld;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
 pub use closing::{Closings, closing, residual};
 pub use drop::{Faces, lift};
@@ -64,8 +68,10 @@ pub use profile::Profile;
 pub use stream::{Band, stream, stream_bytes};
 pub use tables::Tables;
 #[doc(hidden)]
-pub use tiles::{Way, cutter_location_by};
+pub use tiles::cutter_location_by;
 pub use tiles::{cutter_location, cutter_location_rows, cutter_location_rows_into, erode};
+#[doc(hidden)]
+pub use way::Way;
 
 /// Why a compensation was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,7 +1,7 @@
 use super::field::{Field, PAD, Sense, Targets};
 use super::pairs::{OverSamples, PassRow, TargetRow, UnderPasses};
 use super::stencil::Stencil;
-use super::tiles::dilate;
+use super::way::dilate;
 use super::{Profile, Tables};
 use crate::grid::{Heights, Window};
 use rayon::prelude::*;

@@ -1,10 +1,10 @@
 //! Where samples can touch a ball: boxes of offsets in closed form.
 
 use super::ball::{Ball, Reachable};
-use super::blocks::{Block, Lanes, ROWS};
+use super::blocks::{Block, Lanes, ROWS, count, spans_of};
 use super::boxes::Boxes;
 use super::bundle::raise_bundle;
-use super::contact::{BLOCK_WORK, MANY, On, ROW_WORK, Touch, count, spans_of};
+use super::contact::{BLOCK_WORK, MANY, On, ROW_WORK, Touch};
 use super::edges::Edges;
 use super::field::{Field, PAD, Targets};
 use super::flank::Flank;

@@ -2,7 +2,8 @@ use super::Tables;
 use super::ball::FARTHEST;
 use super::blocks::ROWS;
 use super::field::{Field, Sense, Targets};
-use super::tiles::{Going, OnTile, Way, is_searched, on_tiles, strip_columns};
+use super::tiles::{Going, OnTile, on_tiles, strip_columns};
+use super::way::{Way, is_searched};
 use crate::grid::{Heights, Window};
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
 use super::Profile;
 use super::cones::Cones;
 use super::stencil::Stencil;
-use super::tiles::has_chords;
+use super::way::has_chords;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Bytes of tables that are kept; past that all are made anew.
