@@ -68,24 +68,19 @@ impl Peaks {
     fn standing(&self, shape: &Shape, step_mm: f64, out: Window, reach: i64) -> Heights {
         let mut standing = Heights { window: out, z_mm: vec![f32::NEG_INFINITY; out.samples()] };
         let offsets = offsets(shape, step_mm, reach, |blocks| blocks * BLOCK + BLOCK - 1);
-        for row in out.row..out.row_end() {
-            for &([across, up], rise) in &offsets {
-                let from = row + up;
-                if from < self.blocks.row || from >= self.blocks.row_end() {
-                    continue;
-                }
-                let first = out.column.max(self.blocks.column - across);
-                let end = out.column_end().min(self.blocks.column_end() - across);
-                if first >= end {
-                    continue;
-                }
-                let count = (end - first) as usize;
-                let to = (row - out.row) as usize * out.columns + (first - out.column) as usize;
-                let at = (from - self.blocks.row) as usize * self.blocks.columns
-                    + (first + across - self.blocks.column) as usize;
-                raise_row(&mut standing.z_mm[to..to + count], &self.z_mm[at..at + count], rise);
+        let around = out.grown(reach as usize);
+        let mut z_mm = vec![f32::NEG_INFINITY; around.samples()];
+        if let Some(shared) = around.intersection(&self.blocks) {
+            for row in shared.row..shared.row_end() {
+                let place = |window: Window| {
+                    let column = (shared.column - window.column) as usize;
+                    (row - window.row) as usize * window.columns + column
+                };
+                let (to, at) = (place(around), place(self.blocks));
+                z_mm[to..to + shared.columns].copy_from_slice(&self.z_mm[at..at + shared.columns]);
             }
         }
+        over_offsets(&mut standing, &Heights { window: around, z_mm }, &offsets, raise_row);
         standing
     }
 }
@@ -153,17 +148,56 @@ fn lower(least: &Heights, blocks: Window, lowest: &Heights, design: &Heights) ->
 /// The lowest that a cutter which stands no lower than this leaves of any sample of each block.
 fn eroded(shape: &Shape, step_mm: f64, standing: &Heights, out: Window, reach: i64) -> Heights {
     let mut least = Heights { window: out, z_mm: vec![f32::INFINITY; out.samples()] };
-    let from = standing.window;
     let offsets = offsets(shape, step_mm, reach, |blocks| (blocks * BLOCK - BLOCK + 1).max(0));
-    for row in out.row..out.row_end() {
-        let to = (row - out.row) as usize * out.columns;
-        for &([across, up], rise) in &offsets {
-            let at =
-                (row + up - from.row) as usize * from.columns + (out.column + across - from.column) as usize;
-            lower_row(&mut least.z_mm[to..to + out.columns], &standing.z_mm[at..at + out.columns], rise);
+    over_offsets(&mut least, standing, &offsets, lower_row);
+    least
+}
+
+/// Takes into each block of `to` those of `from` at these offsets, by rows of it.
+fn over_offsets(
+    to: &mut Heights,
+    from: &Heights,
+    offsets: &[([i64; 2], f32)],
+    take: impl Fn(&mut [f32], &[f32], f32),
+) {
+    let window = to.window;
+    let at = |row: i64, column: i64| {
+        (row - from.window.row) as usize * from.window.columns + (column - from.window.column) as usize
+    };
+    // A flat's offsets are runs in which all rise alike: what a run holds is what two runs of a power of two hold.
+    if offsets.iter().all(|(_, rise)| *rise == 0.0) {
+        let runs: Vec<(i64, i64)> =
+            offsets.chunk_by(|a, b| a.0[1] == b.0[1]).map(|run| (run[0].0[1], 1 - 2 * run[0].0[0])).collect();
+        let longest = runs.iter().map(|(_, length)| *length).max().unwrap_or(1);
+        let mut doubled = vec![from.z_mm.clone()];
+        for level in 0..longest.ilog2() as usize {
+            let mut next = doubled[level].clone();
+            let by = 1 << level;
+            let count = next.len().saturating_sub(by);
+            // Runs past the end of a row are not looked at.
+            take(&mut next[..count], &doubled[level][by..], 0.0);
+            doubled.push(next);
+        }
+        for row in window.row..window.row_end() {
+            let start = (row - window.row) as usize * window.columns;
+            let to = &mut to.z_mm[start..start + window.columns];
+            for &(up, length) in &runs {
+                let level = length.ilog2() as usize;
+                let first = window.column - (length - 1) / 2;
+                for first in [first, first + length - (1 << level)] {
+                    take(to, &doubled[level][at(row + up, first)..][..window.columns], 0.0);
+                }
+            }
+        }
+        return;
+    }
+    for row in window.row..window.row_end() {
+        let start = (row - window.row) as usize * window.columns;
+        let to = &mut to.z_mm[start..start + window.columns];
+        for &([across, up], rise) in offsets {
+            take(to, &from.z_mm[at(row + up, window.column + across)..][..window.columns], rise);
         }
     }
-    least
 }
 
 /// Every offset between blocks within the cutter, and the cutter's rise there, less or more its rounding; `samples`
