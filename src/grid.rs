@@ -124,6 +124,14 @@ impl Heights {
 
     /// Copies the part of this window that `window` covers; the rest is no data.
     pub fn crop(&self, window: Window) -> Heights {
+        if self.window.intersection(&window) == Some(window) {
+            let first = (window.column - self.window.column) as usize;
+            let mut z_mm = Vec::with_capacity(window.samples());
+            for row in window.row..window.row_end() {
+                z_mm.extend_from_slice(&self.row(row)[first..][..window.columns]);
+            }
+            return Heights { window, z_mm };
+        }
         let mut out = Heights::empty(window);
         if let Some(shared) = self.window.intersection(&window) {
             for row in shared.row..shared.row_end() {
@@ -153,25 +161,11 @@ pub fn lower_row(z_mm: &mut [f32], from_mm: &[f32], by_mm: f32) {
     });
 }
 
-/// A loop over two rows, compiled for vectors of 256 bits where the processor has them.
-#[inline(always)]
+/// A loop over two rows, compiled for the widest vectors that the processor has.
 fn each_pair(z_mm: &mut [f32], from_mm: &[f32], of: impl Fn(f32, f32) -> f32) {
-    #[inline(always)]
-    fn body(z_mm: &mut [f32], from_mm: &[f32], of: impl Fn(f32, f32) -> f32) {
+    pulp::Arch::new().dispatch(|| {
         for (z, from) in z_mm.iter_mut().zip(from_mm) {
             *z = of(*z, *from);
         }
-    }
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn avx2(z_mm: &mut [f32], from_mm: &[f32], of: impl Fn(f32, f32) -> f32) {
-            body(z_mm, from_mm, of);
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature was found on this processor.
-            return unsafe { avx2(z_mm, from_mm, of) };
-        }
-    }
-    body(z_mm, from_mm, of);
+    });
 }

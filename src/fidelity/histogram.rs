@@ -34,10 +34,12 @@ impl Histogram {
     pub fn add_all(&mut self, quanta: &[f64]) {
         let (mut bins, mut above) = ([0u32; TOGETHER], [0u8; TOGETHER]);
         for quanta in quanta.chunks(TOGETHER) {
-            for (bin, quanta) in bins.iter_mut().zip(quanta) {
-                // What is not a number becomes 0.
-                *bin = (quanta + 0.5).clamp(0.0, PAST_LINEAR) as i32 as u32;
-            }
+            pulp::Arch::new().dispatch(|| {
+                for (bin, quanta) in bins.iter_mut().zip(quanta) {
+                    // What is not a number becomes 0.
+                    *bin = (quanta + 0.5).clamp(0.0, PAST_LINEAR) as i32 as u32;
+                }
+            });
             let mut kept = 0;
             for (k, &bin) in bins[..quanta.len()].iter().enumerate() {
                 above[kept] = k as u8;

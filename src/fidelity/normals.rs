@@ -168,18 +168,21 @@ fn angle_keys(design: [&[f32]; 5], machined: [&[f32]; 5], per_rise: f64, keys: &
     let count = keys.len();
     let [dl, dr, db, da, dc] = design.map(|row| &row[..count]);
     let [ml, mr, mb, ma, mc] = machined.map(|row| &row[..count]);
-    for i in 0..count {
-        let slope = |low: f32, high: f32| (f64::from(high) - f64::from(low)) * per_rise;
-        let a = [slope(dl[i], dr[i]), slope(db[i], da[i])];
-        let b = [slope(ml[i], mr[i]), slope(mb[i], ma[i])];
-        let (cross, dot) = cross_and_dot(a, b);
-        // NaN where the sample itself has no data.
-        let held = 0.0 * (f64::from(dc[i]) - f64::from(mc[i]));
-        keys[i] = cross / dot * KEY_OF_45_DEG + held;
-    }
+    pulp::Arch::new().dispatch(|| {
+        for i in 0..count {
+            let slope = |low: f32, high: f32| (f64::from(high) - f64::from(low)) * per_rise;
+            let a = [slope(dl[i], dr[i]), slope(db[i], da[i])];
+            let b = [slope(ml[i], mr[i]), slope(mb[i], ma[i])];
+            let (cross, dot) = cross_and_dot(a, b);
+            // NaN where the sample itself has no data.
+            let held = 0.0 * (f64::from(dc[i]) - f64::from(mc[i]));
+            keys[i] = cross / dot * KEY_OF_45_DEG + held;
+        }
+    });
 }
 
 /// Of the normals (-ax, -ay, 1) and (-bx, -by, 1).
+#[inline(always)]
 fn cross_and_dot([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> (f64, f64) {
     let (u, v, w) = (ax - bx, ay - by, ax * by - ay * bx);
     ((u * u + v * v + w * w).sqrt(), ax * bx + ay * by + 1.0)

@@ -192,13 +192,14 @@ impl Tally {
                 cavity: cavity.map(|cavity| &cavity[part.clone()]),
                 passes: passes.map(|passes| &passes[part]),
             };
-            if !self.add_together(&samples) {
+            if !pulp::Arch::new().dispatch(|| self.add_together(&samples)) {
                 (0..samples.design.len()).for_each(|k| self.add_sample(&samples, k));
             }
         }
     }
 
     /// Counts samples that all have data and small figures; false, and nothing counted, if some have not.
+    #[inline(always)]
     fn add_together(&mut self, samples: &Samples) -> bool {
         let count = samples.design.len();
         let nothing = [0.0; TOGETHER];
@@ -385,6 +386,7 @@ pub(super) const TOGETHER: usize = 128;
 const TOGETHER_MM: f64 = 16.0;
 
 /// The nearest whole number, the even one of two, up to 2^51: plain x86-64 has no instruction for it.
+#[inline(always)]
 fn whole(units: f64) -> f64 {
     const SHIFT: f64 = (3u64 << 51) as f64;
     (units + SHIFT) - SHIFT
