@@ -145,8 +145,10 @@ impl Table {
         let z = origin.z[lane] + self.turns[i];
         let (none, all) = (E::splat(f64::NEG_INFINITY), E::splat(f64::INFINITY));
         let (mut least, mut most) = (none, all);
-        // A, B and C of what the move has cost before the span, less what stands in the span's sums before it.
-        let mut before = [0.0, 0.0, origin.cost[lane] + self.block];
+        let begun = E::splat(origin.cost[lane] + self.block);
+        // A, B and C of what the move has cost before the span, less what stands in the span's sums before it; what
+        // costs nothing is nothing to the bit, so that of equal ways the first is kept.
+        let mut before = [0.0; 3];
         // The first group may hold the point itself and some before it.
         let mut start = (i + 1) / EIGHT;
         let mut later = u8::MAX << ((i + 1) % EIGHT);
@@ -177,10 +179,10 @@ impl Table {
                 let (over, under) = (E::after(low, least), E::after(high, most));
                 let [a, b, c] = self.sums[group].through::<E>(x, e);
                 cost = [E::add(a, spent[0]), E::add(b, spent[1]), E::add(c, spent[2])];
+                let [a, b, c] = [cost[0], cost[1], E::add(begun, cost[2])];
                 for points in &mut self.points[group * layers..][..layers] {
                     let old = E::load(&points.cost);
                     let s = E::multiply(E::subtract(E::load(&points.z), height), part);
-                    let [a, b, c] = cost;
                     let new = E::add(E::multiply(E::subtract(E::multiply(a, s), b), s), c);
                     let better = E::is_less(E::within(later, over, s, under), new, old);
                     E::store(E::choose(better, new, old), &mut points.cost);
