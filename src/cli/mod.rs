@@ -20,6 +20,7 @@ mod program;
 mod raster;
 mod resume;
 mod simulate;
+mod simulated;
 mod staging;
 mod tools;
 
