@@ -75,8 +75,7 @@ impl Measured {
 impl Facts<'_> {
     /// Samples that are looked at.
     pub(super) fn looked_at(&self) -> u64 {
-        let windows = |tile| self.windows(tile).into_iter().flatten();
-        self.tiles.iter().flat_map(windows).map(|window: Window| window.samples() as u64).sum()
+        self.windows().iter().flatten().map(|window| window.samples() as u64).sum()
     }
 
     /// Lets go what is held of a tile, unless it is the only one.
@@ -86,14 +85,13 @@ impl Facts<'_> {
         }
     }
 
-    /// The windows of a tile that are looked at, in groups.
-    fn windows(&self, tile: &TileSetup) -> Vec<Vec<Window>> {
-        let lattice = tile.surface().lattice();
-        let windows = match self.share {
-            share if share < 1.0 => squares(&lattice, share),
-            _ => blocks_of(&lattice, [BLOCK; 2]).concat(),
-        };
-        windows.chunks(TOGETHER).map(<[Window]>::to_vec).collect()
+    /// The windows that are looked at, of each tile its own.
+    fn windows(&self) -> Vec<Vec<Window>> {
+        let lattices = self.tiles.iter().map(|tile| tile.surface().lattice());
+        match self.share {
+            share if share < 1.0 => squares(lattices, share),
+            _ => lattices.map(|lattice| blocks_of(&lattice, [BLOCK; 2]).concat()).collect(),
+        }
     }
 
     fn params(&self) -> fidelity::Params {
@@ -109,10 +107,13 @@ impl Facts<'_> {
             masks: Vec::new(),
             designed: LightTally::default(),
         };
-        for tile in self.tiles {
+        for (tile, windows) in self.tiles.iter().zip(self.windows()) {
+            if windows.is_empty() {
+                continue;
+            }
             tile.piece.hold()?;
             let sight = self.sight(tile);
-            for row in self.windows(tile) {
+            for row in windows.chunks(TOGETHER) {
                 let measured: Vec<_> = row
                     .par_iter()
                     .map(|&window| {

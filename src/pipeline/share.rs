@@ -1,4 +1,4 @@
-//! A share of a tile's area, spread evenly, and how far what is measured on it may be from the whole.
+//! A share of the tiles' area, spread evenly, and how far what is measured on it may be from the whole.
 
 use crate::fidelity::light::draw;
 use crate::grid::{Lattice, Window};
@@ -6,33 +6,38 @@ use crate::grid::{Lattice, Window};
 /// Samples along a side of a square that is looked at: two or three cells of a screen, more than most cutters reach.
 const SQUARE: usize = 1024;
 
-/// The squares of a tile that stand for all of it: of every 1 / `share` in a row one, drawn by its place. All of
-/// them where `share` is 1.
-pub fn squares(lattice: &Lattice, share: f64) -> Vec<Window> {
+/// The squares that stand for all of some tiles, of each tile its own: of every 1 / `share` in a row one, drawn by its
+/// place, the tiles one after the other. All of them where `share` is 1.
+pub fn squares(tiles: impl IntoIterator<Item = Lattice>, share: f64) -> Vec<Vec<Window>> {
     let starts = |count: usize| (0..count).step_by(SQUARE);
-    let mut all: Vec<Window> = Vec::new();
-    for (nth, row) in starts(lattice.rows).enumerate() {
-        let rows = SQUARE.min(lattice.rows - row);
-        let along = starts(lattice.columns).map(|column| {
-            let columns = SQUARE.min(lattice.columns - column);
-            Window { column: column as i64, row: row as i64, columns, rows }
-        });
-        // To and fro, so that neighbours in the list are neighbours on the tile.
-        let mut along: Vec<Window> = along.collect();
-        if nth % 2 == 1 {
-            along.reverse();
+    let mut all: Vec<(usize, Window)> = Vec::new();
+    let mut chosen: Vec<Vec<Window>> = Vec::new();
+    for (tile, lattice) in tiles.into_iter().enumerate() {
+        chosen.push(Vec::new());
+        for (nth, row) in starts(lattice.rows).enumerate() {
+            let rows = SQUARE.min(lattice.rows - row);
+            let along = starts(lattice.columns).map(|column| {
+                let columns = SQUARE.min(lattice.columns - column);
+                (tile, Window { column: column as i64, row: row as i64, columns, rows })
+            });
+            // To and fro, so that neighbours in the list are neighbours on the tile.
+            let mut along: Vec<(usize, Window)> = along.collect();
+            if nth % 2 == 1 {
+                along.reverse();
+            }
+            all.append(&mut along);
         }
-        all.append(&mut along);
     }
     let strata = ((all.len() as f64 * share).round() as usize).clamp(1, all.len().max(1));
     let first = |stratum: usize| stratum * all.len() / strata;
-    (0..strata)
-        .filter_map(|stratum| {
-            let (start, end) = (first(stratum), first(stratum + 1));
-            let [part, ..] = draw(stratum as i64, 0, 0);
-            all.get(start + (part * (end - start) as f64) as usize).copied()
-        })
-        .collect()
+    for stratum in 0..strata {
+        let (start, end) = (first(stratum), first(stratum + 1));
+        let [part, ..] = draw(stratum as i64, 0, 0);
+        if let Some((tile, window)) = all.get(start + (part * (end - start) as f64) as usize) {
+            chosen[*tile].push(*window);
+        }
+    }
+    chosen
 }
 
 /// Standard error of the ratio of two sums over squares, `(part, of)` each in the order of [`squares`], that were
@@ -69,7 +74,7 @@ mod tests {
     #[test]
     fn all_of_a_tile_is_every_square_once() {
         let lattice = lattice(5000, 2100);
-        let all = squares(&lattice, 1.0);
+        let all = squares([lattice], 1.0).concat();
         assert_eq!(all.len(), 15);
         assert_eq!(all.iter().map(Window::samples).sum::<usize>(), 5000 * 2100);
     }
@@ -77,14 +82,21 @@ mod tests {
     #[test]
     fn a_share_is_spread_over_the_tile() {
         let lattice = lattice(20_000, 20_000);
-        let some = squares(&lattice, 0.1);
+        let some = squares([lattice], 0.1).concat();
         assert_eq!(some.len(), 40);
         for quarter in 0..4 {
             let inside = |w: &&Window| w.column / 10_000 + 2 * (w.row / 10_000) == quarter;
             let count = some.iter().filter(inside).count();
             assert!((7..=13).contains(&count), "{count} in quarter {quarter}");
         }
-        assert_eq!(squares(&lattice, 1e-9).len(), 1);
+        assert_eq!(squares([lattice], 1e-9).concat().len(), 1);
+    }
+
+    #[test]
+    fn a_share_of_many_small_tiles_is_no_more_than_that() {
+        let some = squares((0..200).map(|_| lattice(900, 700)), 0.1);
+        assert_eq!(some.len(), 200);
+        assert!(some.chunks(10).all(|tiles| tiles.concat().len() == 1));
     }
 
     /// Of a figure that drifts over the tile and has noise, nine of ten estimates lie within two standard errors.
