@@ -107,6 +107,13 @@ fn held(limit: LineLimit, text: &[u8], line: u64, notes: &mut Vec<Note>) -> Resu
     Ok(())
 }
 
+/// Notes once that a program moves before it has positioned.
+fn from_zero(line: u32, notes: &mut Vec<Note>) {
+    if !notes.iter().any(|note| matches!(note, Note::FromZero { .. })) {
+        notes.push(Note::FromZero { line });
+    }
+}
+
 /// The first byte that a controller does not take any more.
 fn cut(limit: LineLimit, text: &[u8]) -> Option<usize> {
     if text.len() <= limit.bytes {
@@ -343,9 +350,7 @@ impl Modal {
         if self.from_zero && self.motion.is_some_and(|motion| motion != 0) {
             self.from_zero = false;
             if self.at_mm.iter().any(|mm| mm.is_nan()) {
-                if !notes.iter().any(|note| matches!(note, Note::FromZero { .. })) {
-                    notes.push(Note::FromZero { line });
-                }
+                from_zero(line, notes);
                 self.rapid(self.at_mm.map(|mm| if mm.is_nan() { 0.0 } else { mm }), line, each)?;
             }
         }
@@ -353,9 +358,7 @@ impl Modal {
             for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
                 if block.has(letter) && self.at_mm[axis].is_nan() {
                     self.at_mm[axis] = 0.0;
-                    if !notes.iter().any(|note| matches!(note, Note::FromZero { .. })) {
-                        notes.push(Note::FromZero { line });
-                    }
+                    from_zero(line, notes);
                 }
             }
         }
