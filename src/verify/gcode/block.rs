@@ -206,7 +206,7 @@ fn ascii(text: &[u8], from: Place) -> Result<(), Error> {
 }
 
 /// Powers of ten that a double holds exactly.
-const TENS: [f64; 19] =
+pub(super) const TENS: [f64; 19] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18];
 
 /// A number and where it ends. Blanks inside it are skipped, as RS274/NGC section 3.3.1 has it.

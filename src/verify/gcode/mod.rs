@@ -7,6 +7,7 @@
 
 mod arc;
 mod block;
+mod straight;
 
 use std::io::BufRead;
 
@@ -58,7 +59,14 @@ pub(super) fn read(source: &mut dyn BufRead, options: &Options, each: &mut Sink)
     let mut text = Vec::with_capacity(256);
     let mut block = Block::new();
     let (mut number, mut opened, mut ended) = (0u64, false, false);
+    let longest = options.line.map_or(LONGEST_LINE, |limit| limit.bytes.min(LONGEST_LINE));
     loop {
+        if !ended {
+            let passed = modal.straights(source.fill_buf()?, longest, &mut number, each)?;
+            source.consume(passed.bytes);
+            summary.bytes += passed.bytes as u64;
+            summary.blocks += passed.blocks;
+        }
         let taken = line::next(source, &mut text, LONGEST_LINE)?;
         if taken == 0 {
             break;
