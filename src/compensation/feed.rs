@@ -8,12 +8,32 @@ use crate::grid::{Heights, Window};
 /// Bytes of targets that a core's cache may well hold until they are looked at.
 const CACHE: usize = 1 << 20;
 
-/// How far a field was fed: rows taken, and targets opened and given.
+/// How far a field was fed: rows taken, and targets given.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fed {
     taken: i64,
-    opened: usize,
     given: usize,
+}
+
+/// Samples that will be taken soon: reading them from memory goes on beside the search.
+#[derive(Clone, Copy)]
+pub(super) struct Ahead<'a> {
+    rows: [&'a [f32]; ROWS],
+    /// Where column 0 of the field stands in them.
+    shift: i64,
+}
+
+impl Ahead<'_> {
+    /// Asks for those above a block, which begins at this column.
+    #[inline(always)]
+    pub fn fetch<V: Vectors>(&self, first: usize) {
+        let i = (first as i64 + self.shift) as usize;
+        for row in self.rows {
+            if let Some(z) = row.get(i) {
+                V::fetch(z);
+            }
+        }
+    }
 }
 
 /// Takes rows into a field shortly before they are looked at, and gives those targets that nothing
@@ -26,8 +46,6 @@ pub(super) struct Feed<'a, 'b> {
     every: i64,
     /// Row of the field at whose height target 0 stands.
     level: i64,
-    /// Targets there are in all.
-    all: usize,
     /// Where those from `first` on go.
     to: &'a mut [&'b mut [f32]],
     first: usize,
@@ -51,7 +69,7 @@ impl<'a, 'b> Feed<'a, 'b> {
         field.hold(input, ROWS + 2 * far);
         let columns = to.first().map_or(0, |to| to.len());
         targets.hold(columns, on.target_rows, (ROWS + 2 * on.reach as usize) / on.every as usize + 2);
-        let fed = Fed { taken: -1, opened: 0, given: 0 };
+        let fed = Fed { taken: -1, given: 0 };
         Feed::again(h, input, sense, on, to, 0, fed)
     }
 
@@ -67,8 +85,8 @@ impl<'a, 'b> Feed<'a, 'b> {
     ) -> Feed<'a, 'b> {
         let level = on.target_row - on.input_row;
         let is_large = to.iter().map(|to| size_of_val(&**to)).sum::<usize>() > CACHE;
-        let (reach, every, all) = (on.reach, on.every, on.target_rows);
-        Feed { h, input, sense, reach, every, level, all, to, first, is_large, fed }
+        let (reach, every) = (on.reach, on.every);
+        Feed { h, input, sense, reach, every, level, to, first, is_large, fed }
     }
 
     /// Whether all targets that are wanted are given.
@@ -82,31 +100,32 @@ impl<'a, 'b> Feed<'a, 'b> {
         self.level + (self.first + self.to.len()) as i64 * self.every - self.every + self.reach + 1
     }
 
-    /// Takes the samples that these rows of the field are looked at with, and opens the targets
-    /// that they may raise.
+    /// Takes the samples that these rows of the field are looked at with.
     #[inline(always)]
-    pub fn before(&mut self, a: i64, rows: usize, field: &mut Field, targets: &mut Targets) {
+    pub fn before(&mut self, a: i64, rows: usize, field: &mut Field) {
         let far = FARTHEST.min(self.reach as usize) as i64 + 1;
         let end = a + rows as i64;
         while self.fed.taken < end + far && self.fed.taken <= self.input.rows as i64 {
             field.take(self.fed.taken, self.h, self.input, self.sense);
             self.fed.taken += 1;
         }
-        while self.fed.opened < self.all
-            && self.level + self.fed.opened as i64 * self.every < end + self.reach
-        {
-            targets.open(self.fed.opened);
-            self.fed.opened += 1;
-        }
+    }
+
+    /// The rows that [`Feed::before`] takes next.
+    #[inline(always)]
+    pub fn ahead(&self) -> Ahead<'a> {
+        let (h, next) = (self.h, self.input.row + self.fed.taken);
+        let rows = std::array::from_fn(|k| {
+            let row = next + k as i64;
+            if row >= h.window.row && row < h.window.row_end() { h.row(row) } else { &[] }
+        });
+        Ahead { rows, shift: self.input.column - h.window.column }
     }
 
     /// Gives the targets that rows from `a` on cannot reach.
     #[inline(always)]
     pub fn after<V: Vectors>(&mut self, a: i64, targets: &mut Targets) {
-        while self.fed.given < self.fed.opened
-            && !self.is_done()
-            && self.level + (self.fed.given as i64) * self.every + self.reach < a
-        {
+        while !self.is_done() && self.level + (self.fed.given as i64) * self.every + self.reach < a {
             self.give::<V>(targets);
         }
     }
@@ -115,16 +134,13 @@ impl<'a, 'b> Feed<'a, 'b> {
     #[inline(always)]
     pub fn end<V: Vectors>(&mut self, targets: &mut Targets) {
         while !self.is_done() {
-            if self.fed.given == self.fed.opened {
-                targets.open(self.fed.opened);
-                self.fed.opened += 1;
-            }
             self.give::<V>(targets);
         }
     }
 
     #[inline(always)]
     fn give<V: Vectors>(&mut self, targets: &mut Targets) {
+        targets.open(self.fed.given + 1);
         let (to, from) = (&mut *self.to[self.fed.given - self.first], targets.row(self.fed.given));
         if self.is_large {
             self.sense.stream_row::<V>(to, from);

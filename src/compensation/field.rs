@@ -163,24 +163,31 @@ fn stride(columns: usize) -> usize {
     ((columns + 2 * PAD).div_ceil(LANES) | 1) * LANES
 }
 
-/// Cutter positions as kernels write them, in whole cache lines; not all rows need be held at once.
+/// Cutter positions as kernels write them, in whole cache lines; not all rows need be held at once. A row takes up memory
+/// from when it is first raised until it is let go, and then the memory that was used last: the few rows that are being
+/// raised stay in a core's cache.
 pub(super) struct Targets {
     pub columns: usize,
     pub rows: usize,
     stride: usize,
-    /// Where the memory of the rows starts.
-    origin: usize,
-    /// Rows that there is memory for, the first row that is held, and its place.
+    /// Rows that there is memory for, the first row that is held, and the one after the last.
     held: usize,
     first: usize,
-    place: usize,
+    opened: usize,
+    /// Where the rows from `first` on begin, by their number less `held` as often as it goes.
+    starts: Vec<usize>,
+    /// Memory that no row has.
+    free: Vec<usize>,
+    /// A row without data.
+    none: Vec<f32>,
     z: Vec<f32>,
 }
 
 impl Targets {
     pub fn new(columns: usize, rows: usize) -> Targets {
-        let z = Vec::new();
-        let mut targets = Targets { columns, rows, stride: 0, origin: 0, held: 0, first: 0, place: 0, z };
+        let (starts, free, none, z) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut targets =
+            Targets { columns, rows, stride: 0, held: 0, first: 0, opened: 0, starts, free, none, z };
         targets.clear(columns, rows);
         targets
     }
@@ -188,9 +195,7 @@ impl Targets {
     /// Becomes [`Targets::new`], in the memory it has.
     pub fn clear(&mut self, columns: usize, rows: usize) {
         self.hold(columns, rows, rows);
-        for row in 0..rows {
-            self.open(row);
-        }
+        self.open(rows);
     }
 
     /// Becomes rows of which so many are held at once, none of them open yet.
@@ -198,40 +203,49 @@ impl Targets {
         self.columns = columns;
         self.rows = rows;
         self.stride = ((columns + TILE).div_ceil(LANES) | 1) * LANES;
-        self.held = held.min(rows);
-        (self.first, self.place) = (0, 0);
-        untouched(&mut self.z, self.stride * self.held + LANES);
-        self.origin = line(&self.z);
+        self.held = held.min(rows).next_power_of_two();
+        (self.first, self.opened) = (0, 0);
+        let held = held.min(rows);
+        untouched(&mut self.z, self.stride * held + LANES);
+        let origin = line(&self.z);
+        self.starts.clear();
+        self.starts.resize(self.held, 0);
+        self.free.clear();
+        self.free.extend((0..held).rev().map(|place| origin + place * self.stride));
+        self.none.clear();
+        self.none.resize(self.stride, NONE);
     }
 
-    /// Makes a row ready to be raised.
-    #[inline(always)]
-    pub fn open(&mut self, row: usize) {
-        self.row_mut(row).fill(NONE);
+    /// Makes the rows before `end` ready to be raised.
+    #[inline(never)]
+    pub fn open(&mut self, end: usize) {
+        while self.opened < end {
+            let start = self.free.pop().expect("no more rows at once than are held");
+            self.z[start..][..self.stride].copy_from_slice(&self.none);
+            let place = self.opened & (self.held - 1);
+            self.starts[place] = start;
+            self.opened += 1;
+        }
     }
 
     /// Lets the first row go.
     #[inline(always)]
     pub fn close(&mut self) {
+        self.free.push(self.starts[self.first & (self.held - 1)]);
         self.first += 1;
-        self.place = if self.place + 1 == self.held { 0 } else { self.place + 1 };
     }
 
-    #[inline(always)]
-    fn start(&self, row: usize) -> usize {
-        let place = self.place + (row - self.first);
-        self.origin + if place < self.held { place } else { place - self.held } * self.stride
-    }
-
-    /// Row `row` with its padding: column 0 stands at 0.
+    /// Row `row` with its padding, which is open: column 0 stands at 0.
     #[inline(always)]
     pub fn row(&self, row: usize) -> &[f32] {
-        &self.z[self.start(row)..][..self.stride]
+        &self.z[self.starts[row & (self.held - 1)]..][..self.stride]
     }
 
     #[inline(always)]
     pub fn row_mut(&mut self, row: usize) -> &mut [f32] {
-        let start = self.start(row);
-        &mut self.z[start..][..self.stride]
+        if row >= self.opened {
+            self.open(row + 1);
+        }
+        &mut self.z[self.starts[row & (self.held - 1)]..][..self.stride]
     }
 }

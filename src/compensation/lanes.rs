@@ -57,6 +57,10 @@ pub(super) trait Vectors {
     #[inline(always)]
     fn streamed() {}
 
+    /// Asks for what will be read soon.
+    #[inline(always)]
+    fn fetch(_: &f32) {}
+
     /// Does some work in a function of its own, compiled for the same processor: it stands once in the program, not
     /// wherever it is called.
     fn apart<W: Work<Self>>(work: W) -> W::Done

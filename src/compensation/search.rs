@@ -3,7 +3,7 @@
 use super::Profile;
 use super::blocks::{Block, Lanes, ROWS, bend, count, measure, spans_of};
 use super::contact::{MANY, On, ROW_WORK, Touch};
-use super::feed::Feed;
+use super::feed::{Ahead, Feed};
 use super::field::{Field, PAD, Targets};
 use super::lanes::{LANES, LEAST, Vectors};
 use super::pairs::Pairs;
@@ -69,9 +69,10 @@ pub(super) fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
         let part = (((a + count - start) as f64 - lead) / (end - 2.0 * lead)).clamp(0.0, 1.0);
         search.most = (part + ALLOWANCE) * most;
         if let Some(feed) = &mut feed {
-            feed.before(a as i64, count, search.field, out);
+            feed.before(a as i64, count, search.field);
         }
-        search.rows(a as i64, count, out);
+        let ahead = feed.as_ref().map(|feed| feed.ahead());
+        search.rows(a as i64, count, ahead, out);
         if search.work as f64 > search.most {
             return false;
         }
@@ -133,11 +134,14 @@ struct Search<'a, V: Vectors, P: Pairs, T: Touch<V, P>> {
 impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
     /// All blocks of some rows.
     #[inline(always)]
-    fn rows(&mut self, a: i64, rows: usize, out: &mut Targets) {
+    fn rows(&mut self, a: i64, rows: usize, ahead: Option<Ahead<'_>>, out: &mut Targets) {
         let none = Known { rises: Rises::NO_SAMPLE, at: self.touch.nowhere(), is_facet: true };
         let mut level = Level { first: 0, len: 0, known: none };
         for column in 0..self.known.len() - 1 {
             let block = Block { a, first: column * LANES, rows };
+            if let Some(ahead) = &ahead {
+                ahead.fetch::<V>(block.first);
+            }
             let Some(measured) = measure::<V>(self.field, block) else {
                 self.raise_level(a, rows, &mut level, out);
                 continue;

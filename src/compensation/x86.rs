@@ -88,6 +88,11 @@ impl Vectors for Avx2 {
     }
 
     #[inline(always)]
+    fn fetch(z: &f32) {
+        unsafe { x86::_mm_prefetch::<{ x86::_MM_HINT_T1 }>(std::ptr::from_ref(z).cast()) }
+    }
+
+    #[inline(always)]
     fn stream(group: Self::Group, z: &mut [f32; LANES]) {
         assert!(z.as_ptr().addr().is_multiple_of(size_of_val(z)));
         unsafe {
@@ -183,6 +188,11 @@ impl Vectors for Avx512 {
     #[inline(always)]
     fn streamed() {
         unsafe { x86::_mm_sfence() }
+    }
+
+    #[inline(always)]
+    fn fetch(z: &f32) {
+        unsafe { x86::_mm_prefetch::<{ x86::_MM_HINT_T1 }>(std::ptr::from_ref(z).cast()) }
     }
 
     #[inline(always)]
