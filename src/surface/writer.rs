@@ -14,6 +14,9 @@ use crate::whole::{Whole, folder};
 /// Bytes of the strips of a TIFF, about.
 const STRIP_BYTES: u64 = 1 << 20;
 
+/// Samples that are spelled before they are written, about: they are to stay in a core's cache meanwhile.
+const SPELLED: usize = 1 << 16;
+
 /// Writes heights of any size to `.tif`, `.npy` or 16-bit `.png`, by the extension. The bytes
 /// depend on the heights alone, not on the bands they came in.
 pub struct HeightWriter {
@@ -115,24 +118,30 @@ impl HeightWriter {
         let rows = z_mm.len() / columns;
         assert!(self.given + rows <= self.rows, "no more rows than announced");
         let io = |source| Error::Unwritable { path: self.name.clone(), source };
-        let lines = z_mm.chunks_exact(self.columns);
+        let (z_mm, some) = (&z_mm[..rows * columns], columns * (SPELLED / columns).max(1));
         match &mut self.format {
             Format::Tiff { data } => {
-                put_floats(lines.rev(), &mut self.buffer, rows * columns, f32::to_le_bytes);
                 let row = (self.rows - self.given - rows) as u64;
                 let place = *data + row * self.columns as u64 * 4;
                 let file = self.file.file_mut();
                 file.seek(SeekFrom::Start(place)).map_err(io)?;
-                file.write_all(&self.buffer).map_err(io)?;
+                for z_mm in z_mm.rchunks(some) {
+                    let lines = z_mm.chunks_exact(columns).rev();
+                    put_floats(lines, &mut self.buffer, z_mm.len(), f32::to_le_bytes);
+                    file.write_all(&self.buffer).map_err(io)?;
+                }
             }
             Format::Npy => {
-                put_floats(lines, &mut self.buffer, rows * columns, f32::to_ne_bytes);
-                self.file.write_all(&self.buffer).map_err(io)?;
+                for z_mm in z_mm.chunks(some) {
+                    let lines = z_mm.chunks_exact(columns);
+                    put_floats(lines, &mut self.buffer, z_mm.len(), f32::to_ne_bytes);
+                    self.file.write_all(&self.buffer).map_err(io)?;
+                }
             }
             Format::Png { z_range_mm: [low, high], values } => {
                 let scale = 65535.0 / (*high - *low);
                 self.buffer.clear();
-                for (index, line) in lines.enumerate() {
+                for (index, line) in z_mm.chunks_exact(columns).enumerate() {
                     for (column, &z_mm) in line.iter().enumerate() {
                         let path = || self.name.clone();
                         if z_mm.is_nan() {
