@@ -17,13 +17,60 @@ use surfaces::STEP_MM;
 
 const RADII: [usize; 5] = [10, 25, 50, 100, 150];
 
+/// Rounds in which copies, locations and closings take turns, and how long each is repeated in one of them.
+const ROUNDS: usize = 9;
+const LEAST_NS: f64 = 6e7;
+
 /// What this thread has run, in ns: other programs on the machine do not show as much as in wall
 /// time.
 fn spent_ns(since: Instant) -> f64 {
-    std::fs::read_to_string("/proc/thread-self/schedstat")
-        .ok()
-        .and_then(|text| text.split(' ').next()?.parse().ok())
-        .unwrap_or_else(|| since.elapsed().as_secs_f64() * 1e9)
+    #[cfg(target_os = "linux")]
+    {
+        let mut spent = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        // SAFETY: the call writes the time it is given.
+        if unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut spent) } == 0 {
+            return spent.tv_sec as f64 * 1e9 + spent.tv_nsec as f64;
+        }
+    }
+    since.elapsed().as_secs_f64() * 1e9
+}
+
+/// What each of some rounds took, in ns a sample, and in times the first of its round: the processor's speed and what
+/// memory gives change from minute to minute, and less within a round.
+struct Rounds(Vec<Vec<f64>>);
+
+impl Rounds {
+    fn of(samples: f64, runs: &mut [&mut dyn FnMut()]) -> Rounds {
+        let origin = Instant::now();
+        let mut rounds = Vec::new();
+        for round in 0..=ROUNDS {
+            let of_round = runs.iter_mut().map(|run| {
+                let (start, mut times) = (spent_ns(origin), 0);
+                while times == 0 || spent_ns(origin) - start < LEAST_NS {
+                    run();
+                    times += 1;
+                }
+                (spent_ns(origin) - start) / (f64::from(times) * samples)
+            });
+            let of_round = of_round.collect();
+            // The first one takes the memory.
+            if round > 0 {
+                rounds.push(of_round);
+            }
+        }
+        Rounds(rounds)
+    }
+
+    fn least(&self, run: usize) -> f64 {
+        self.0.iter().map(|round| round[run]).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The median over all rounds.
+    fn ratio(&self, run: usize, to: usize) -> f64 {
+        let mut ratios: Vec<f64> = self.0.iter().map(|round| round[run] / round[to]).collect();
+        ratios.sort_by(f64::total_cmp);
+        ratios[ratios.len() / 2]
+    }
 }
 
 /// The least of some runs, in ns.
@@ -118,39 +165,41 @@ fn main() {
     let noise = surfaces::from(side, 400.min(side), |_, _| 70.0 * random.next());
     let samples = (side * side) as f64;
     let window = h.window;
-    let mut to = h.z_mm.clone();
-    // Often, because the clock of a thread moves in steps of milliseconds.
-    const COPIES: usize = 60;
-    let copy = nanoseconds(3, || {
-        for _ in 0..COPIES {
-            to.copy_from_slice(black_box(&h.z_mm));
-            black_box(&to);
-        }
-    }) / (samples * COPIES as f64);
-    drop(to);
-    let (mut cl, mut fifth, mut closing, mut flat) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut cl, mut copies, mut flat) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut to_copy, mut fifth, mut closing) = (Vec::new(), Vec::new(), Vec::new());
     let (mut naive, mut known) = (Vec::new(), Vec::new());
     let mut done = Heights { window, z_mm: Vec::new() };
     let mut rows = done.clone();
     let mut closings = Closings::new();
+    // Memory of the same kind as locations are in.
+    let mut to = compensation::cutter_location(&h, &ball(10), window);
     for radius in RADII {
         let profile = ball(radius);
-        // Small cutters often, as copies, because of the clock's steps.
-        let often = (200 / radius).max(1);
-        let per_sample = |run: &mut dyn FnMut()| {
-            nanoseconds(4, || (0..often).for_each(|_| run())) / (samples * often as f64)
-        };
-        // Locations, rows and closings in memory that is there, as a copy is: the first of four runs takes it.
-        cl.push(per_sample(&mut || {
-            compensation::cutter_location_rows_into(&h, &profile, window, 1, &mut done);
-        }));
-        fifth.push(per_sample(&mut || {
-            compensation::cutter_location_rows_into(&h, &profile, window, 5, &mut rows);
-        }));
-        closing.push(per_sample(&mut || _ = black_box(closings.of(&h, &Tables::new(profile), window))));
+        // All in memory that is there.
+        let rounds = Rounds::of(
+            samples,
+            &mut [
+                &mut || {
+                    to.z_mm.copy_from_slice(black_box(&h.z_mm));
+                    black_box(&to);
+                },
+                &mut || compensation::cutter_location_rows_into(&h, &profile, window, 1, &mut done),
+                &mut || compensation::cutter_location_rows_into(&h, &profile, window, 5, &mut rows),
+                &mut || _ = black_box(closings.of(&h, &Tables::new(profile), window)),
+            ],
+        );
+        copies.push(rounds.least(0));
+        cl.push(rounds.least(1));
+        to_copy.push(rounds.ratio(1, 0));
+        fifth.push(rounds.ratio(2, 1));
+        closing.push(rounds.ratio(3, 1));
         naive.push(naive_ns_per_sample(&h, &profile));
         let disc = cutter(&format!("flat:{}", 2.0 * radius as f64 * STEP_MM));
-        flat.push(per_sample(&mut || drop(black_box(compensation::cutter_location(&h, &disc, window)))));
+        let often = (200 / radius).max(1);
+        let of_disc = nanoseconds(4, || {
+            (0..often).for_each(|_| drop(black_box(compensation::cutter_location(&h, &disc, window))));
+        });
+        flat.push(of_disc / (samples * often as f64));
         let by = |way| {
             nanoseconds(2, || {
                 drop(black_box(compensation::cutter_location_by(&noise, &profile, noise.window, way)))
@@ -167,15 +216,16 @@ fn main() {
     let opencv = peers(&words);
     let opencv = |i: usize| opencv.as_ref().and_then(|ns| ns.get(2 * i + 1)).copied();
 
-    println!("{side} x {side} samples; a copy takes {copy:.2} ns a sample\n");
+    println!("{side} x {side} samples\n");
     println!("| R in samples | 10 | 25 | 50 | 100 | 150 |\n|---|---|---|---|---|---|");
+    line("a copy, ns a sample", copies.into_iter().map(Some), 2);
     line("ball CL, ns a sample", cl.iter().map(|ns| Some(*ns)), 1);
-    line("ball CL, times a copy", cl.iter().map(|ns| Some(ns / copy)), 1);
+    line("ball CL, times a copy", to_copy.into_iter().map(Some), 1);
     line("naive loop, times ball CL", naive.iter().zip(&cl).map(|(n, ns)| Some(n / ns)), 0);
     line("flat disc, ns a sample", flat.iter().map(|ns| Some(*ns)), 1);
     line("OpenCV's dilate, times flat disc", flat.iter().enumerate().map(|(i, ns)| Some(opencv(i)? / ns)), 1);
-    line("every 5th row, part of ball CL", fifth.iter().zip(&cl).map(|(f, ns)| Some(f / ns)), 2);
-    line("closing, times ball CL", closing.iter().zip(&cl).map(|(c, ns)| Some(c / ns)), 2);
+    line("every 5th row, part of ball CL", fifth.into_iter().map(Some), 2);
+    line("closing, times ball CL", closing.into_iter().map(Some), 2);
     line("white noise, times the better way", known.into_iter().map(Some), 2);
     println!();
     if let Some(scipy) = peers(&["scipy", &heights, "25"]) {
