@@ -156,14 +156,20 @@ impl Straight {
 fn number(text: &[u8], from: usize) -> Option<(f64, usize)> {
     let sign = *text.get(from)?;
     let at = from + usize::from(matches!(sign, b'+' | b'-'));
-    let (mut mantissa, count) = digits(text, at)?;
-    let (mut end, mut decimals) = (at + count, 0);
-    if *text.get(end)? == b'.' {
-        let (part, count) = digits(text, end + 1)?;
-        mantissa = mantissa * POWERS[count] + part;
-        (end, decimals) = (end + 1 + count, count);
-    }
-    if count + decimals == 0 {
+    let first = Eight::of(text, at)?;
+    let whole = first.digits();
+    let (mantissa, decimals, end) = if first.bytes[whole % 8] != b'.' || whole == 8 {
+        (first.number(whole)?, 0, at + whole)
+    } else if let Some(end) = first.second_end() {
+        (first.without(whole).number(end - 1)?, end - 1 - whole, at + end)
+    } else {
+        let after = Eight::of(text, at + whole + 1)?;
+        let decimals = after.digits();
+        let mantissa = first.number(whole)? * POWERS.get(decimals)? + after.number(decimals)?;
+        (mantissa, decimals, at + whole + 1 + decimals)
+    };
+    // A point alone is no number.
+    if end - at == usize::from(first.bytes[0] == b'.') {
         return None;
     }
     let value = mantissa as f64 / TENS[decimals];
@@ -171,27 +177,58 @@ fn number(text: &[u8], from: usize) -> Option<(f64, usize)> {
 }
 
 const POWERS: [u64; 8] = [1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000];
+const LOW: u64 = u64::from_ne_bytes([0x7f; 8]);
 
-/// The digits that a text has at this place, as a number, and how many: all at once, eight bytes in a word. None where there are
-/// eight or more, or less than eight bytes are left.
-fn digits(text: &[u8], at: usize) -> Option<(u64, usize)> {
-    let bytes = text.get(at..)?.first_chunk::<8>()?;
-    let word = u64::from_le_bytes(*bytes) ^ u64::from_ne_bytes([b'0'; 8]);
-    // The top bit of each byte that is more than 9; none carries into the next.
-    let low = u64::from_ne_bytes([0x7f; 8]);
-    let others = ((word & low) + u64::from_ne_bytes([0x76; 8]) | word) & !low;
-    let count = others.trailing_zeros() / 8;
-    if count == 8 {
-        return None;
+/// Eight bytes that are looked at together.
+#[derive(Clone, Copy)]
+struct Eight {
+    bytes: [u8; 8],
+    /// What digits are worth; the first in the lowest byte.
+    worth: u64,
+    /// The top bit of each byte that is no digit.
+    others: u64,
+}
+
+impl Eight {
+    /// None where a text does not have so many any more.
+    fn of(text: &[u8], at: usize) -> Option<Eight> {
+        let bytes = *text.get(at..)?.first_chunk::<8>()?;
+        let worth = u64::from_le_bytes(bytes) ^ u64::from_ne_bytes([b'0'; 8]);
+        // More than 9 carries into the top bit, and none into the next byte.
+        let others = ((worth & LOW) + u64::from_ne_bytes([0x76; 8]) | worth) & !LOW;
+        Some(Eight { bytes, worth, others })
     }
-    // The first digit is in the lowest byte; zeros before it change nothing.
-    let word = word << 8 << (56 - 8 * count);
-    // Pairs, then fours, then all eight (Lemire's parse_eight_digits_unrolled).
-    let pairs = word.wrapping_mul(10).wrapping_add(word >> 8);
-    let every = 0x0000_00ff_0000_00ff;
-    let fours = (pairs & every).wrapping_mul(100 + (1_000_000 << 32));
-    let value = fours.wrapping_add((pairs >> 16 & every).wrapping_mul(1 + (10_000 << 32))) >> 32;
-    Some((value, count as usize))
+
+    /// How many digits come first.
+    fn digits(self) -> usize {
+        self.others.trailing_zeros() as usize / 8
+    }
+
+    /// Where the digits behind the first byte that is none end, if they do.
+    fn second_end(self) -> Option<usize> {
+        let second = self.others & self.others.wrapping_sub(1);
+        (second != 0).then(|| second.trailing_zeros() as usize / 8)
+    }
+
+    /// All but one byte.
+    fn without(self, at: usize) -> Eight {
+        let before = (1 << (8 * at)) - 1;
+        Eight { worth: self.worth & before | self.worth >> 8 & !before, ..self }
+    }
+
+    /// The number that the first `count` bytes spell, less than eight.
+    fn number(self, count: usize) -> Option<u64> {
+        if count > 7 {
+            return None;
+        }
+        // Zeros before the first digit change nothing.
+        let word = self.worth << 8 << (56 - 8 * count);
+        // Pairs, then fours, then all eight (Lemire's parse_eight_digits_unrolled).
+        let pairs = word.wrapping_mul(10).wrapping_add(word >> 8);
+        let every = 0x0000_00ff_0000_00ff;
+        let fours = (pairs & every).wrapping_mul(100 + (1_000_000 << 32));
+        Some(fours.wrapping_add((pairs >> 16 & every).wrapping_mul(1 + (10_000 << 32))) >> 32)
+    }
 }
 
 #[cfg(test)]
