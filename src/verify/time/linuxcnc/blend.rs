@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use super::segment::{End, NORMAL, Segment, Shape, TANGENTIAL};
-use super::{Limits, SAME_PLACE};
+use super::{Limits, SAME_PLACE, greater, greatest, least, lesser};
 
 /// ARC_BLEND_KINK_RATIO as delivered.
 const KINK_RATIO: f64 = 0.1;
@@ -14,15 +14,8 @@ const SHORTEST_ARC: f64 = 1e-6;
 /// Directions within this count as one line.
 const SAME_DIRECTION: f64 = 1e-3;
 
-/// An arc that comes between two segments.
-pub(super) struct Between {
-    pub blend: Segment,
-    /// Whether anything is left of the line before it.
-    pub keeps: bool,
-}
-
-/// Joins a new segment to the last of the queue (tp.c: tpHandleBlendArc).
-pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) -> Option<Between> {
+/// Joins a new segment to the last of the queue (tp.c: tpHandleBlendArc); gives the arc that comes between them, if any does.
+pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) -> Option<RoundedCorner> {
     if before.progress > 0.5 * before.length || before.end == End::Stop {
         return None;
     }
@@ -32,15 +25,15 @@ pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) ->
         return None;
     }
     // What the kink asks of the axes, at the speed of the slower, within one period of the servo loop.
-    let speed = before.speed_asked().min(next.speed_asked());
+    let speed = lesser(before.speed_asked(), next.speed_asked());
     let jump = (u2 - u1).abs() * (speed / limits.period + next.acceleration) / limits.acceleration;
-    let mut asks = jump.max_element();
+    let mut asks = greatest(jump);
     if before.shape == Shape::Arc || next.shape == Shape::Arc {
         asks /= TANGENTIAL;
     }
-    let share = asks.min(KINK_RATIO);
-    before.kink_after = before.kink_after.max(share);
-    next.kink_before = next.kink_before.max(share);
+    let share = lesser(asks, KINK_RATIO);
+    before.kink_after = greater(before.kink_after, share);
+    next.kink_before = greater(next.kink_before, share);
     if asks < KINK_RATIO {
         before.kink_speed = Some(speed);
         before.end_with(End::Tangent, next);
@@ -53,14 +46,12 @@ pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) ->
     let straight_on = speed * KINK_RATIO / asks;
     let corner = Corner::between(u1, u2);
     if let Some(arc) = RoundedCorner::fit(limits, before, next, &corner) {
-        let blend = arc.segment(limits, before);
+        let fastest = arc.fastest(limits, before);
         // What a parabola could reach at most settles most corners.
         let cut = 2.0 * before.acceleration * before.tolerance;
         let most2 = if before.tolerance > 0.0 { cut / corner.cos_theta } else { f64::INFINITY };
-        let clear = 4.0 * blend.speed_max * blend.speed_max > most2;
-        if blend.speed_max > straight_on
-            && (clear || blend.speed_max > 0.5 * parabola_speed(limits, before, next, &corner))
-        {
+        let clear = 4.0 * fastest * fastest > most2;
+        if fastest > straight_on && (clear || fastest > 0.5 * parabola_speed(limits, before, next, &corner)) {
             forget_kink(before, next);
             next.length -= arc.reach;
             if arc.keeps {
@@ -68,7 +59,7 @@ pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) ->
                 before.end_with(End::Tangent, next);
             }
             next.parabola_before = false;
-            return Some(Between { blend, keeps: arc.keeps });
+            return Some(arc);
         }
     }
     let parabola = 0.5 * parabola_speed(limits, before, next, &corner);
@@ -98,8 +89,8 @@ struct Corner {
 impl Corner {
     fn between(u1: DVec3, u2: DVec3) -> Corner {
         // |u2 - u1| = 2 sin(phi / 2), which keeps its digits at small turns.
-        let cos_theta = (0.5 * (u2 - u1).length()).min(1.0);
-        let sin_theta = (0.5 * (u2 + u1).length()).min(1.0);
+        let cos_theta = lesser(0.5 * (u2 - u1).length(), 1.0);
+        let sin_theta = lesser(0.5 * (u2 + u1).length(), 1.0);
         Corner {
             turn: 2.0 * cos_theta.asin(),
             sin_theta,
@@ -115,8 +106,8 @@ fn parabola_speed(limits: &Limits, before: &Segment, next: &Segment, corner: &Co
         before,
         next,
         corner,
-        before.speed_asked().min(limits.path_speed),
-        next.speed_asked().min(limits.path_speed),
+        lesser(before.speed_asked(), limits.path_speed),
+        lesser(next.speed_asked(), limits.path_speed),
     );
     0.5 * corner.sin_theta * (this + after)
 }
@@ -127,13 +118,13 @@ fn parabola_speeds(before: &Segment, next: &Segment, corner: &Corner, this: f64,
     let reach = |segment: &Segment, a: f64| {
         (a * if segment.settled { segment.length } else { 0.5 * segment.length }).sqrt()
     };
-    let (v1, v2) = (reach(before, a1).min(this), reach(next, a2).min(after));
-    let longest = (before.length / v1).min(next.length / v2);
-    let time = longest.min((v1 / a1).max(v2 / a2));
-    let mut speeds = [v1.min(time * a1), v2.min(time * a2)];
+    let (v1, v2) = (lesser(reach(before, a1), this), lesser(reach(next, a2), after));
+    let longest = lesser(before.length / v1, next.length / v2);
+    let time = lesser(longest, greater(v1 / a1, v2 / a2));
+    let mut speeds = [lesser(v1, time * a1), lesser(v2, time * a2)];
     if before.tolerance > 0.0 && corner.cos_theta > 1e-3 {
         let cut = 2.0 * (a1 * before.tolerance / corner.cos_theta).sqrt();
-        speeds = speeds.map(|v| v.min(cut));
+        speeds = speeds.map(|v| lesser(v, cut));
     }
     speeds
 }
@@ -144,7 +135,7 @@ pub(super) fn parabola_begins(before: &Segment, next: &Segment, this: f64, after
 }
 
 /// An arc that rounds a corner (blendmath.c: blendComputeParameters).
-struct RoundedCorner {
+pub(super) struct RoundedCorner {
     radius: f64,
     turn: f64,
     /// What it takes of the segment before and of the next.
@@ -153,7 +144,7 @@ struct RoundedCorner {
     asked: f64,
     acceleration: f64,
     /// What is left of the line before it is long enough to stay.
-    keeps: bool,
+    pub keeps: bool,
 }
 
 impl RoundedCorner {
@@ -179,7 +170,7 @@ impl RoundedCorner {
             Some(most * circle.radius)
         };
         let half = 0.5 * before.nominal_length;
-        let l1 = side(before, 1, 2.0 / 3.0, before.length.min(half), 1.0, next.first)?;
+        let l1 = side(before, 1, 2.0 / 3.0, lesser(before.length, half), 1.0, next.first)?;
         let l2 = side(next, 0, 1.0 / 3.0, 0.5 * next.length, -1.0, before.last)?;
         if less > 0.0 {
             let theta = (theta - less).max(SMALLEST_ANGLE);
@@ -187,24 +178,24 @@ impl RoundedCorner {
         }
         let tolerance = |segment: &Segment| {
             let quarter = 0.25 * segment.nominal_length;
-            if segment.tolerance == 0.0 { quarter } else { segment.tolerance.min(quarter) }
+            if segment.tolerance == 0.0 { quarter } else { lesser(segment.tolerance, quarter) }
         };
-        let tolerance = tolerance(before).min(tolerance(next));
+        let tolerance = lesser(tolerance(before), tolerance(next));
         let acceleration = in_plane(across, limits.acceleration);
         let normal = NORMAL * acceleration;
-        let asked = before.speed_asked().max(next.speed_asked());
+        let asked = greater(before.speed_asked(), next.speed_asked());
         let plane = in_plane(across, limits.speed);
         let goal = if asked <= plane { asked } else { asked.min(plane.max(altitude(before, next, turn))) };
 
         let tan_theta = sin_theta / cos_theta;
         // h = P / (1 - sin theta), d = h cos theta; 1 - sin = cos^2 / (1 + sin).
-        let d = (tolerance * (1.0 + sin_theta) / cos_theta).min(l1).min(l2);
+        let d = lesser(lesser(tolerance * (1.0 + sin_theta) / cos_theta, l1), l2);
         let radius_most = tan_theta * d;
-        let speed = (normal * radius_most).sqrt().min(goal);
+        let speed = lesser((normal * radius_most).sqrt(), goal);
         // A parabola's way at half of the acceleration tells how much of the segments is worth taking.
         let slow = 0.5 * acceleration;
-        let way = (2.0 * slow * d).sqrt().min(speed) / slow * speed;
-        let radius = (speed * speed / normal).max((way / turn).min(radius_most));
+        let way = lesser((2.0 * slow * d).sqrt(), speed) / slow * speed;
+        let radius = greater(speed * speed / normal, lesser(way / turn, radius_most));
         if radius < SAME_PLACE || radius * turn < SHORTEST_ARC {
             return None;
         }
@@ -215,9 +206,19 @@ impl RoundedCorner {
         Some(RoundedCorner { radius, turn, reach, speed, asked, acceleration, keeps })
     }
 
-    fn segment(&self, limits: &Limits, before: &Segment) -> Segment {
+    fn length(&self, before: &Segment) -> f64 {
         let rest = if self.keeps { 0.0 } else { before.length - self.reach };
-        let length = self.radius * self.turn + rest;
+        self.radius * self.turn + rest
+    }
+
+    /// The speed that its segment is settled to.
+    fn fastest(&self, limits: &Limits, before: &Segment) -> f64 {
+        lesser(self.speed, self.length(before) / limits.period)
+    }
+
+    /// The segment that comes between the one before, which gives it what it took, and the next.
+    pub fn segment(&self, limits: &Limits, before: &Segment) -> Segment {
+        let length = self.length(before);
         let mut blend = Segment {
             shape: Shape::Blend,
             circle: None,
@@ -233,6 +234,8 @@ impl RoundedCorner {
             kink_before: 0.0,
             kink_after: 0.0,
             settled: false,
+            gain2: 0.0,
+            spread_speed: 0.0,
             end_speed: 0.0,
             at_peak: false,
             active: false,
@@ -254,7 +257,7 @@ impl RoundedCorner {
 /// The largest of a vector in any direction of a plane, from limits per axis.
 fn in_plane(normal: DVec3, limits: DVec3) -> f64 {
     let along = (DVec3::ONE - normal * normal).max(DVec3::splat(SAME_PLACE * SAME_PLACE));
-    (limits * limits / along).min_element().sqrt()
+    least(limits * limits / along).sqrt()
 }
 
 /// The least speed on the line between the speed vectors of two lines; 0 beside an arc.

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::super::round::Round;
 use super::segment::{Circle, End, NORMAL, Segment, Shape, TANGENTIAL};
-use super::{Controller, Cycles, Limits, SAME_PLACE};
+use super::{Controller, Cycles, Limits, SAME_PLACE, greatest, lesser};
 use crate::verify::reading::PathMode;
 
 /// Longest chain of blocks that are merged.
@@ -149,8 +149,8 @@ impl Controller {
         let unit = way / length;
         let segment = self.segment(Shape::Line, length, [unit, unit], rapid);
         self.push(Segment {
-            requested: asked.min(speed),
-            speed_max: speed.min(length / self.limits.period),
+            requested: lesser(asked, speed),
+            speed_max: lesser(speed, length / self.limits.period),
             acceleration: length / slow,
             ..segment
         });
@@ -176,6 +176,8 @@ impl Controller {
             kink_after: 0.0,
             tolerance: self.tolerance,
             settled: false,
+            gain2: 0.0,
+            spread_speed: 0.0,
             end_speed: 0.0,
             at_peak: false,
             active: false,
@@ -196,5 +198,5 @@ fn longest(way: DVec3, limits: DVec3) -> f64 {
     let way = way.abs();
     let times = way / limits;
     let moved = way.cmpge(DVec3::splat(NO_WAY));
-    DVec3::select(moved, times, DVec3::ZERO).max_element()
+    greatest(DVec3::select(moved, times, DVec3::ZERO))
 }

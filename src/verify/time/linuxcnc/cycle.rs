@@ -12,6 +12,8 @@ const EVEN: f64 = 1e-12;
 const LAST: f64 = 1.0 + 1e-6;
 /// What is this part of a limit is below it, however it was rounded.
 const CLEAR: f64 = 1.0 - 1e-9;
+/// And what is this part of it is above it.
+const OVER: f64 = 1.0 + 1e-9;
 
 impl Controller {
     /// One cycle of the servo loop, or up to `most` at once while nothing changes.
@@ -263,9 +265,18 @@ fn trapezoid(segment: &Segment, bounds: &Bounds, left: f64) -> (f64, f64) {
     let half = 0.5 * along * segment.period;
     let root = end * end + along * (2.0 * left - segment.speed * segment.period) + half * half;
     let most = if root > half * half { root.sqrt() - half } else { -half };
-    let speed = within(most, asked);
+    let change = within(most, asked) - segment.speed;
     let period = greater(segment.period, NO_TIME);
-    (within((speed - segment.speed) / period, along), most)
+    let gain = along * period * OVER;
+    // What is clear of the limit does not wait for a root and a division.
+    let acceleration = if change > gain {
+        along
+    } else if change < -gain {
+        -along
+    } else {
+        within(change / period, along)
+    };
+    (acceleration, most)
 }
 
 /// Whether the segment ends before the next cycle does, and when (tp.c: tpCheckEndCondition).

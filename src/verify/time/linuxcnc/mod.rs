@@ -29,6 +29,16 @@ fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
+/// The least of a vector.
+fn least(vector: DVec3) -> f64 {
+    lesser(vector.x, lesser(vector.y, vector.z))
+}
+
+/// The greatest of a vector.
+fn greatest(vector: DVec3) -> f64 {
+    greater(vector.x, greater(vector.y, vector.z))
+}
+
 /// What of a machine the controller knows, in mm and s.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {

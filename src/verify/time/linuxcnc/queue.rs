@@ -1,11 +1,9 @@
 use std::collections::VecDeque;
 
-use super::blend::{Between, join};
+use super::blend::join;
 use super::segment::{End, Segment};
-use super::{Controller, Limits};
+use super::{Controller, Limits, lesser};
 
-/// A block is spread over this many servo cycles at least (TP_MIN_SEGMENT_CYCLES).
-const SHORTEST_CYCLES: f64 = 1.02;
 /// The backward pass ends after more peaks than this (TP_OPTIMIZATION_CUTOFF).
 const PEAKS: u32 = 4;
 
@@ -18,14 +16,15 @@ impl Controller {
             if before.rapid != next.rapid {
                 before.end_with(End::Stop, &mut next);
             }
-            let between = join(&self.limits, before, &mut next);
-            if between.as_ref().is_none_or(|between| between.keeps) {
-                before.settle(self.limits.period);
-            } else {
-                self.queue.pop_back();
-            }
-            if let Some(Between { blend, .. }) = between {
-                self.queue.push_back(blend);
+            match join(&self.limits, before, &mut next) {
+                Some(arc) if arc.keeps => {
+                    before.settle(self.limits.period);
+                    let blend = arc.segment(&self.limits, before);
+                    self.queue.push_back(blend);
+                }
+                // Nothing is left of the line.
+                Some(arc) => *before = arc.segment(&self.limits, before),
+                None => before.settle(self.limits.period),
             }
         }
         self.queue.push_back(next);
@@ -64,24 +63,25 @@ fn brake_backward(queue: &mut VecDeque<Segment>, limits: &Limits) {
             return;
         }
         if this.settled {
-            let mut limit = this.speed_max.min(before.speed_max);
+            let mut limit = lesser(this.speed_max, before.speed_max);
             if let Some(kink) = before.kink_speed {
-                limit = limit.min(kink);
+                limit = lesser(limit, kink);
             }
-            let from2 = this.end_speed * this.end_speed + 2.0 * this.acceleration_along() * this.length;
+            let from2 = this.end_speed * this.end_speed + this.gain2;
             if from2 >= limit * limit {
                 before.end_speed = limit;
                 before.at_peak = true;
             } else {
                 before.end_speed = from2.sqrt();
             }
-            this.speed_max = this.speed_max.min(this.length / (SHORTEST_CYCLES * limits.period));
+            this.speed_max = lesser(this.speed_max, this.spread_speed);
         } else {
             // Half of it may still go to a blend: stop by the half.
             let triangle = (this.acceleration_along() * this.length).sqrt();
-            let mut speed = before.speed_max.min(triangle).min(this.speed_asked()).min(limits.path_speed);
+            let most = lesser(lesser(before.speed_max, triangle), this.speed_asked());
+            let mut speed = lesser(most, limits.path_speed);
             if let Some(kink) = before.kink_speed {
-                speed = speed.min(kink);
+                speed = lesser(speed, kink);
             }
             before.end_speed = speed;
             this.end_speed = 0.0;

@@ -8,6 +8,9 @@ pub(super) const TANGENTIAL: f64 = 0.5;
 /// sqrt(1 - [`TANGENTIAL`]^2).
 pub(super) const NORMAL: f64 = 0.866_025_403_784_438_6;
 
+/// A block is spread over this many servo cycles at least (TP_MIN_SEGMENT_CYCLES).
+const SHORTEST_CYCLES: f64 = 1.02;
+
 /// How a segment hands over to the next (tc_types.h: TC_TERM_COND_*).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
@@ -72,6 +75,10 @@ pub(super) struct Segment {
     pub tolerance: f64,
     /// No blend will shorten it any more.
     pub settled: bool,
+    /// Of one that is settled: what its acceleration adds to the square of its speed, and the speed that spreads it over enough
+    /// cycles.
+    pub gain2: f64,
+    pub spread_speed: f64,
     /// Speed at its end, as far as the queue can be braked from.
     pub end_speed: f64,
     pub at_peak: bool,
@@ -120,7 +127,7 @@ impl Segment {
         if self.settled {
             return;
         }
-        self.speed_max = self.speed_max.min(self.length / period);
+        self.speed_max = lesser(self.speed_max, self.length / period);
         if let Some(circle) = &self.circle {
             let whole = self.acceleration_whole();
             let radius = circle.radius + circle.climb * circle.climb / circle.radius;
@@ -132,6 +139,8 @@ impl Segment {
                 self.tangential = (1.0 - (normal / whole).powi(2)).sqrt();
             }
         }
+        self.gain2 = 2.0 * self.acceleration_along() * self.length;
+        self.spread_speed = self.length / (SHORTEST_CYCLES * period);
         self.settled = true;
     }
 
