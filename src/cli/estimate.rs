@@ -161,12 +161,12 @@ fn estimate(path: &Path, options: &Options, kinematics: &Kinematics) -> Result<E
     let travel = travel(path, options)?;
     let mut timer = Clock::new(kinematics, travel);
     let mut extent = Extent::with_travel(travel);
-    let summary = stream(path, options, &mut |event| {
-        timer.event(event);
+    let mut reach = |event: &Event| {
         if let Event::Move(motion) = event {
             extent.add(motion);
         }
-    })?;
+    };
+    let summary = stream(path, options, &mut reach, &mut |event| timer.event(event))?;
     let timing = timer.finish(summary.bytes);
     let notes = summary.notes.iter().map(ToString::to_string).collect();
     Ok(Estimated { summary, extent, timing, notes, errors: Vec::new() })
@@ -178,11 +178,12 @@ fn travel(path: &Path, options: &Options) -> Result<Travel, Refused> {
         return Ok(Travel::default());
     }
     let mut search = TravelSearch::default();
-    stream(path, options, &mut |event| {
+    let mut look = |event: &Event| {
         if let Event::Move(motion) = event {
             search.add(motion);
         }
-    })?;
+    };
+    stream(path, options, &mut look, &mut |_| ())?;
     Ok(search.found())
 }
 

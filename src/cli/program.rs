@@ -78,8 +78,13 @@ pub fn read(path: &Path, options: &Options) -> Result<Reading, Refused> {
 }
 
 /// Reads a program event by event; a text without a motion is refused. The text is taken apart on a
-/// thread of its own.
-pub fn stream(path: &Path, options: &Options, each: &mut dyn FnMut(&Event)) -> Result<Summary, Refused> {
+/// thread of its own, where `beside` gets every event first.
+pub fn stream(
+    path: &Path,
+    options: &Options,
+    beside: &mut (dyn FnMut(&Event) + Send),
+    each: &mut dyn FnMut(&Event),
+) -> Result<Summary, Refused> {
     let refused = |source| Refused::Text { path: path.into(), source };
     let (mut file, options) = (open(path)?, *options);
     let (sender, batches) = mpsc::sync_channel::<Vec<Event>>(BATCHES);
@@ -88,6 +93,7 @@ pub fn stream(path: &Path, options: &Options, each: &mut dyn FnMut(&Event)) -> R
         let reader = scope.spawn(move || {
             let mut batch = Vec::with_capacity(BATCH);
             let summary = verify::read(&mut file, &options, &mut |event| {
+                beside(event);
                 batch.push(*event);
                 if batch.len() == BATCH {
                     // The other end takes everything until this one is done.
