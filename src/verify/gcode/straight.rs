@@ -195,7 +195,7 @@ impl Eight {
         let bytes = *text.get(at..)?.first_chunk::<8>()?;
         let worth = u64::from_le_bytes(bytes) ^ u64::from_ne_bytes([b'0'; 8]);
         // More than 9 carries into the top bit, and none into the next byte.
-        let others = ((worth & LOW) + u64::from_ne_bytes([0x76; 8]) | worth) & !LOW;
+        let others = (((worth & LOW) + u64::from_ne_bytes([0x76; 8])) | worth) & !LOW;
         Some(Eight { bytes, worth, others })
     }
 
@@ -213,7 +213,7 @@ impl Eight {
     /// All but one byte.
     fn without(self, at: usize) -> Eight {
         let before = (1 << (8 * at)) - 1;
-        Eight { worth: self.worth & before | self.worth >> 8 & !before, ..self }
+        Eight { worth: (self.worth & before) | ((self.worth >> 8) & !before), ..self }
     }
 
     /// The number that the first `count` bytes spell, less than eight.
@@ -222,12 +222,12 @@ impl Eight {
             return None;
         }
         // Zeros before the first digit change nothing.
-        let word = self.worth << 8 << (56 - 8 * count);
+        let word = (self.worth << 8) << (56 - 8 * count);
         // Pairs, then fours, then all eight (Lemire's parse_eight_digits_unrolled).
         let pairs = word.wrapping_mul(10).wrapping_add(word >> 8);
         let every = 0x0000_00ff_0000_00ff;
         let fours = (pairs & every).wrapping_mul(100 + (1_000_000 << 32));
-        Some(fours.wrapping_add((pairs >> 16 & every).wrapping_mul(1 + (10_000 << 32))) >> 32)
+        Some(fours.wrapping_add(((pairs >> 16) & every).wrapping_mul(1 + (10_000 << 32))) >> 32)
     }
 }
 
