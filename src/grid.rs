@@ -147,25 +147,26 @@ impl Heights {
 
 /// z = max(z, from - by_mm); no data raises nothing.
 pub fn raise_row(z_mm: &mut [f32], from_mm: &[f32], by_mm: f32) {
-    each_pair(z_mm, from_mm, |z, from| {
-        let raised = from - by_mm;
+    each_pair(z_mm, from_mm, by_mm, |z, from, by| {
+        let raised = from - by;
         if raised > z { raised } else { z }
     });
 }
 
 /// z = min(z, from + by_mm); no data lowers nothing.
 pub fn lower_row(z_mm: &mut [f32], from_mm: &[f32], by_mm: f32) {
-    each_pair(z_mm, from_mm, |z, from| {
-        let lowered = from + by_mm;
+    each_pair(z_mm, from_mm, by_mm, |z, from, by| {
+        let lowered = from + by;
         if lowered < z { lowered } else { z }
     });
 }
 
 /// A loop over two rows, compiled for the widest vectors that the processor has.
-fn each_pair(z_mm: &mut [f32], from_mm: &[f32], of: impl Fn(f32, f32) -> f32) {
-    pulp::Arch::new().dispatch(|| {
+fn each_pair(z_mm: &mut [f32], from_mm: &[f32], by_mm: f32, of: impl Fn(f32, f32, f32) -> f32) {
+    // Moved: behind a reference it could be one of the heights that are written, and the loop went one by one.
+    pulp::Arch::new().dispatch(move || {
         for (z, from) in z_mm.iter_mut().zip(from_mm) {
-            *z = of(*z, *from);
+            *z = of(*z, *from, by_mm);
         }
     });
 }

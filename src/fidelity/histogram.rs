@@ -1,5 +1,7 @@
 //! Counts of a quantity that is never negative, from which any percentile can be read.
 
+use super::rounding::to_u32;
+
 /// Bins of a page; a page is held only once something falls into it.
 const PAGE: usize = 4096;
 /// Values below 2^LINEAR_BITS quanta keep a bin each.
@@ -34,14 +36,17 @@ impl Histogram {
     pub fn add_all(&mut self, quanta: &[f64]) {
         let (mut bins, mut above) = ([0u32; TOGETHER], [0u8; TOGETHER]);
         for quanta in quanta.chunks(TOGETHER) {
-            pulp::Arch::new().dispatch(|| {
-                for (bin, quanta) in bins.iter_mut().zip(quanta) {
-                    // What is not a number becomes 0.
-                    *bin = (quanta + 0.5).clamp(0.0, PAST_LINEAR) as i32 as u32;
+            let bins = &mut bins[..quanta.len()];
+            let to = &mut *bins;
+            pulp::Arch::new().dispatch(move || {
+                for (bin, quanta) in to.iter_mut().zip(quanta) {
+                    let bounded = if *quanta > 0.0 { *quanta } else { 0.0 };
+                    let bounded = if bounded < PAST_LINEAR { bounded } else { PAST_LINEAR };
+                    *bin = to_u32((bounded + 0.5).floor());
                 }
             });
             let mut kept = 0;
-            for (k, &bin) in bins[..quanta.len()].iter().enumerate() {
+            for (k, &bin) in bins.iter().enumerate() {
                 above[kept] = k as u8;
                 kept += usize::from(bin != 0);
             }

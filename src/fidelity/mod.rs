@@ -11,6 +11,7 @@ mod normals;
 mod outline;
 mod pixels;
 pub mod polish;
+mod rounding;
 mod tally;
 
 pub use bound::Peaks;

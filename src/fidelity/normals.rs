@@ -168,7 +168,8 @@ fn angle_keys(design: [&[f32]; 5], machined: [&[f32]; 5], per_rise: f64, keys: &
     let count = keys.len();
     let [dl, dr, db, da, dc] = design.map(|row| &row[..count]);
     let [ml, mr, mb, ma, mc] = machined.map(|row| &row[..count]);
-    pulp::Arch::new().dispatch(|| {
+    // Moved, so that nothing that is read can be what is written.
+    pulp::Arch::new().dispatch(move || {
         for i in 0..count {
             let slope = |low: f32, high: f32| (f64::from(high) - f64::from(low)) * per_rise;
             let a = [slope(dl[i], dr[i]), slope(db[i], da[i])];

@@ -4,6 +4,7 @@ use super::Pixels;
 use super::histogram::Histogram;
 use super::normals::Normals;
 use super::pixels::total;
+use super::rounding::whole;
 use crate::grid::{Heights, Window};
 
 /// |deviation| is counted in nanometres.
@@ -201,13 +202,16 @@ impl Tally {
     /// Counts samples that all have data and small figures; false, and nothing counted, if some have not.
     #[inline(always)]
     fn add_together(&mut self, samples: &Samples) -> bool {
-        let count = samples.design.len();
+        // Copied, so that no row that is read can be what is written.
+        let Samples { design, machined, cavity, passes, .. } = *samples;
+        let count = design.len();
+        let (design, machined) = (&design[..count], &machined[..count]);
         let nothing = [0.0; TOGETHER];
         let (mut deviation_mm, mut quanta, mut units) = (nothing, nothing, nothing);
         let (mut unreachable, mut rounding) = (nothing, nothing);
         let mut far = nothing;
         for k in 0..count {
-            let mm = f64::from(samples.machined[k]) - f64::from(samples.design[k]);
+            let mm = f64::from(machined[k]) - f64::from(design[k]);
             deviation_mm[k] = mm;
             quanta[k] = mm.abs() / DEVIATION_QUANTUM_MM;
             units[k] = whole(mm * SUM_UNITS_PER_MM);
@@ -215,7 +219,8 @@ impl Tally {
         }
         let mut above = 0;
         let mut deepest_mm = 0.0f32;
-        if let Some(cavity) = samples.cavity {
+        if let Some(cavity) = cavity {
+            let cavity = &cavity[..count];
             for k in 0..count {
                 let mm = f64::from(cavity[k]);
                 unreachable[k] = whole(mm * SUM_UNITS_PER_MM);
@@ -224,9 +229,10 @@ impl Tally {
                 deepest_mm = if cavity[k] > deepest_mm { cavity[k] } else { deepest_mm };
             }
         }
-        if let Some(passes) = samples.passes {
+        if let Some(passes) = passes {
+            let passes = &passes[..count];
             for k in 0..count {
-                let mm = f64::from(samples.machined[k]) - f64::from(passes[k]);
+                let mm = f64::from(machined[k]) - f64::from(passes[k]);
                 rounding[k] = whole(mm * SUM_UNITS_PER_MM);
                 far[k] += mm.abs();
             }
@@ -384,13 +390,6 @@ pub(super) const TOGETHER: usize = 128;
 
 /// Sums of so many figures below this, in the sums' units, are exact in a double.
 const TOGETHER_MM: f64 = 16.0;
-
-/// The nearest whole number, the even one of two, up to 2^51: plain x86-64 has no instruction for it.
-#[inline(always)]
-fn whole(units: f64) -> f64 {
-    const SHIFT: f64 = (3u64 << 51) as f64;
-    (units + SHIFT) - SHIFT
-}
 
 /// Rounded to the sums' unit; differences of real surfaces are far below the 8 km at which this saturates.
 pub(super) fn to_sum(mm: f64) -> i64 {
