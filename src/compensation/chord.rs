@@ -16,11 +16,25 @@ widest! {
     /// made once; a chord is then the maximum of two of them.
     ///
     /// Urbach and Wilkinson, IEEE Trans. Image Processing 17 (2008), doi:10.1109/TIP.2007.912582.
-    fn flat_bottom<P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) = body
+    ///
+    /// `wanted` tells of each target row which groups of lanes are to be raised, in order; None is all of them.
+    fn flat_bottom<P: Pairs>(
+        field: &Field,
+        pairs: &P,
+        out: &mut Targets,
+        reach: f64,
+        wanted: Option<&[Vec<Range<usize>>]>,
+    ) = body
 }
 
 #[inline(always)]
-pub(super) fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, out: &mut Targets, reach: f64) {
+pub(super) fn body<V: Vectors, P: Pairs>(
+    field: &Field,
+    pairs: &P,
+    out: &mut Targets,
+    reach: f64,
+    wanted: Option<&[Vec<Range<usize>>]>,
+) {
     let levels = (2.0 * reach + 2.0).log2().floor() as usize + 1;
     let shifts = (0..out.rows)
         .map(|b| pairs.shift(b))
@@ -32,6 +46,9 @@ pub(super) fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, out: &mut Tar
     let mut maxima = Maxima::default();
     for strip in (0..out.columns).step_by(STRIP) {
         let columns = whole_groups((out.columns - strip).min(STRIP));
+        let groups = strip / LANES..(strip + columns) / LANES;
+        let all = std::slice::from_ref(&groups);
+        let parts = |b: usize| wanted.map_or(all, |wanted| overlapping(&wanted[b], &groups));
         let start = PAD as i64 + strip as i64;
         let from = (start + shifts[0] - halo).max(0);
         let end = start + shifts[1] + columns as i64 + halo + LANES as i64;
@@ -39,14 +56,22 @@ pub(super) fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, out: &mut Tar
         maxima.hold(from as usize..end as usize, levels);
         for a in (0..field.rows as i64).step_by(ROWS) {
             let rows = ROWS.min(field.rows - a as usize);
-            for k in 0..rows {
-                maxima.fill::<V>(k, field.row(a + k as i64));
-            }
             let targets = (a..a + rows as i64)
                 .map(|a| pairs.targets(a, -reach, reach))
                 .filter(|targets| !targets.is_empty())
                 .reduce(|all, targets| all.start.min(targets.start)..all.end.max(targets.end));
-            for b in targets.unwrap_or(0..0) {
+            let targets = targets.unwrap_or(0..0);
+            if targets.clone().all(|b| parts(b).is_empty()) {
+                continue;
+            }
+            for k in 0..rows {
+                maxima.fill::<V>(k, field.row(a + k as i64));
+            }
+            for b in targets {
+                let parts = parts(b);
+                if parts.is_empty() {
+                    continue;
+                }
                 let mut chords: [[&[f32]; 2]; ROWS] = [[&[]; 2]; ROWS];
                 let mut count = 0;
                 for k in 0..rows {
@@ -58,16 +83,35 @@ pub(super) fn body<V: Vectors, P: Pairs>(field: &Field, pairs: &P, out: &mut Tar
                     }
                 }
                 let to = &mut out.row_mut(b)[strip..][..columns];
-                match chords {
-                    _ if count == 0 => {}
-                    [p, q, r, s] if count == ROWS => raise::<V, 4>(to, [p, q, r, s]),
-                    [p, q, r, _] if count == 3 => raise::<V, 3>(to, [p, q, r]),
-                    [p, q, _, _] if count == 2 => raise::<V, 2>(to, [p, q]),
-                    [p, _, _, _] => raise::<V, 1>(to, [p]),
+                for part in parts {
+                    let part = part.start.max(groups.start)..part.end.min(groups.end);
+                    let part = (part.start - groups.start) * LANES..(part.end - groups.start) * LANES;
+                    let to = &mut to[part.clone()];
+                    let cut = |chord| columns_of(chord, &part);
+                    match chords {
+                        _ if count == 0 => {}
+                        [p, q, r, s] if count == ROWS => raise::<V, 4>(to, [p, q, r, s].map(cut)),
+                        [p, q, r, _] if count == 3 => raise::<V, 3>(to, [p, q, r].map(cut)),
+                        [p, q, _, _] if count == 2 => raise::<V, 2>(to, [p, q].map(cut)),
+                        [p, _, _, _] => raise::<V, 1>(to, [p].map(cut)),
+                    }
                 }
             }
         }
     }
+}
+
+#[inline(always)]
+fn columns_of<'a>(chord: [&'a [f32]; 2], part: &Range<usize>) -> [&'a [f32]; 2] {
+    chord.map(|row| &row[part.clone()])
+}
+
+/// Those of some ranges in order that share something with `range`.
+#[inline(always)]
+fn overlapping<'a>(ranges: &'a [Range<usize>], range: &Range<usize>) -> &'a [Range<usize>] {
+    let first = ranges.partition_point(|part| part.end <= range.start);
+    let end = ranges.partition_point(|part| part.start < range.end);
+    &ranges[first..end.max(first)]
 }
 
 /// to = max(to, both of all chords), over whole groups.

@@ -1,6 +1,7 @@
 //! What a cutter leaves at best.
 
-use super::field::Sense;
+use super::field::{Field, Sense, Targets};
+use super::marked::{Marked, by_flat};
 use super::tiles::on_samples_into;
 use super::way::Way;
 use super::{Profile, Tables};
@@ -29,6 +30,28 @@ impl Closings {
         let around = out.grown(tables.profile().reach());
         on_samples_into(h, tables, around, 1, Sense::Raise, Way::Known, cl);
         on_samples_into(cl, tables, out, 1, Sense::Lower, Way::Known, closed);
+        closed
+    }
+
+    /// [`Closings::of`] a flat at the marked samples of `out`, from positions in marked squares only; no data, or the
+    /// closing, at the others.
+    ///
+    /// # Panics
+    /// For another cutter than a flat.
+    pub fn of_flat_at(
+        &mut self,
+        h: &Heights,
+        tables: &Tables,
+        out: Window,
+        [positions, marked]: [&Marked; 2],
+    ) -> &Heights {
+        let profile = tables.profile();
+        assert!(profile.plateau_mm() >= profile.radius_mm(), "{} is no flat", profile.shape());
+        let Closings { cl, closed } = self;
+        let mut scratch = (Field::empty(0, 0), Targets::new(0, 0));
+        let around = out.grown(profile.reach());
+        by_flat(h, tables, (around, positions), Sense::Raise, cl, &mut scratch);
+        by_flat(cl, tables, (out, marked), Sense::Lower, closed, &mut scratch);
         closed
     }
 }

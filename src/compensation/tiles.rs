@@ -224,7 +224,7 @@ impl<'a> OnTile<'a> {
     }
 
     /// What a tile reads, and how its samples are paired.
-    fn pairs(&self, tile: Window) -> (Window, OnSamples<'_>) {
+    pub fn pairs(&self, tile: Window) -> (Window, OnSamples<'_>) {
         let reach = self.profile.reach() as i64;
         // One more than is under the cutter, for its neighbours.
         let halo = reach + 1;
@@ -313,7 +313,7 @@ mod tests {
             done(&mut |targets| {
                 let plateau = profile.plateau_mm() / profile.step_mm();
                 if plateau > 0.0 {
-                    chord::body::<V, _>(&field, &pairs, targets, plateau + 1.0);
+                    chord::body::<V, _>(&field, &pairs, targets, plateau + 1.0, None);
                 }
                 if plateau < profile.radius() {
                     bounded::body::<V, _>(&field, &pairs, plateau > 0.0, targets);
@@ -331,6 +331,7 @@ mod tests {
                     &pairs,
                     targets,
                     profile.plateau_mm() / profile.step_mm() + 1.0,
+                    None,
                 );
             }
             if profile.plateau_mm() < profile.radius_mm() {

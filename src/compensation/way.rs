@@ -69,7 +69,7 @@ pub(super) fn without_search<P: Pairs>(
 ) {
     let chords = has_chords(profile);
     if chords {
-        chord::flat_bottom(field, pairs, targets, profile.plateau_mm() / profile.step_mm() + 1.0);
+        chord::flat_bottom(field, pairs, targets, profile.plateau_mm() / profile.step_mm() + 1.0, None);
         if profile.plateau_mm() >= profile.radius_mm() {
             return;
         }

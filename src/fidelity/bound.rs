@@ -1,15 +1,16 @@
 //! How low a cutter could get at best, from the highest samples of small blocks: what a closing is good for is known
 //! of most places without making it.
 
+use crate::compensation::Marked;
 use crate::cutter::Shape;
-use crate::grid::{Heights, Window, lower_row, raise_row};
+use crate::grid::{Heights, Window};
+
+use super::offsets::{Offset, lower_over, offsets, raise_over};
 
 /// Samples along the side of a block.
 const BLOCK: i64 = 8;
 /// Blocks along the side of a piece that is looked at by itself.
 const PIECE: i64 = 16;
-/// More than the rounding of heights as floats, in mm; a flat's are not rounded at all.
-const ROUNDED_MM: f64 = 1e-5;
 
 /// The highest sample of each block of a window, minus infinity where there is none.
 pub struct Peaks {
@@ -38,30 +39,34 @@ impl Peaks {
         Peaks { blocks, z_mm }
     }
 
-    /// Where a cutter's closing could be lower than `lowest`, a closing of `design` in the same window: windows that
-    /// hold all such samples, as few as are together less work to close. The heights looked over should reach as far
-    /// around as those that the closing would be made from.
-    pub fn lower_within(
-        &self,
-        shape: &Shape,
-        step_mm: f64,
-        lowest: &Heights,
-        design: &Heights,
-    ) -> Vec<Window> {
+    /// Where a cutter's closing could be lower than `lowest`, a closing of `design` in the same window. The heights
+    /// looked over should reach as far around as those that the closing would be made from.
+    pub fn lower_within(&self, shape: &Shape, step_mm: f64, lowest: &Heights, design: &Heights) -> Lower {
         let wanted = blocks(lowest.window);
         let reach = (shape.radius_mm() / (BLOCK as f64 * step_mm)).ceil() as i64 + 1;
         let standing = self.standing(shape, step_mm, wanted.grown(reach as usize), reach);
-        let least = eroded(shape, step_mm, &standing, wanted, reach);
+        let near = offsets(shape, step_mm, reach, |blocks| (blocks * BLOCK - BLOCK + 1).max(0));
+        let mut least = Heights { window: wanted, z_mm: vec![f32::INFINITY; wanted.samples()] };
+        lower_over(&mut least, &standing, &near);
+        // The highest sample of each block that could be lower.
+        let mut tops = Heights { window: wanted, z_mm: vec![f32::NEG_INFINITY; wanted.samples()] };
         let mut found = Vec::new();
         for row in (wanted.row..wanted.row_end()).step_by(PIECE as usize) {
             for column in (wanted.column..wanted.column_end()).step_by(PIECE as usize) {
                 let side = PIECE as usize;
                 let piece = Window { column, row, columns: side, rows: side };
                 let Some(piece) = wanted.intersection(&piece) else { continue };
-                found.extend(lower(&least, piece, lowest, design));
+                found.extend(lower(&least, piece, lowest, design, &mut tops));
             }
         }
-        together(found, (shape.radius_mm() / step_mm).ceil() as usize)
+        let is_flat = near.iter().all(|(_, rise)| *rise == 0.0);
+        let marks = (is_flat && !found.is_empty()).then(|| {
+            let hopes = hopes(&tops, standing.window, reach as usize, &near);
+            let could = hopes.z_mm.iter().zip(&standing.z_mm).map(|(hope, stands)| stands < hope).collect();
+            let any = tops.z_mm.iter().map(|top| *top > f32::NEG_INFINITY).collect();
+            [Marked::new(BLOCK as usize, standing.window, could), Marked::new(BLOCK as usize, wanted, any)]
+        });
+        Lower { within: together(found, (shape.radius_mm() / step_mm).ceil() as usize), marks }
     }
 
     /// The lowest that the cutter could stand at any sample of each block.
@@ -80,9 +85,31 @@ impl Peaks {
                 z_mm[to..to + shared.columns].copy_from_slice(&self.z_mm[at..at + shared.columns]);
             }
         }
-        over_offsets(&mut standing, &Heights { window: around, z_mm }, &offsets, raise_row);
+        raise_over(&mut standing, &Heights { window: around, z_mm }, &offsets);
         standing
     }
+}
+
+/// Where a cutter's closing could be lower than another one.
+pub struct Lower {
+    /// Windows that hold all such samples, as few as are together less work to close.
+    pub within: Vec<Window>,
+    /// Of a flat, where it could have to stand for that, and the samples by themselves.
+    pub marks: Option<[Marked; 2]>,
+}
+
+/// For every block in which a cutter could stand, the highest of those near it that it could lower.
+fn hopes(tops: &Heights, out: Window, reach: usize, near: &[Offset]) -> Heights {
+    let around = out.grown(reach);
+    let mut known = Heights { window: around, z_mm: vec![f32::NEG_INFINITY; around.samples()] };
+    for row in tops.window.row..tops.window.row_end() {
+        let column = (tops.window.column - around.column) as usize;
+        let start = (row - around.row) as usize * around.columns + column;
+        known.z_mm[start..start + tops.window.columns].copy_from_slice(tops.row(row));
+    }
+    let mut hopes = Heights { window: out, z_mm: vec![f32::NEG_INFINITY; out.samples()] };
+    raise_over(&mut hopes, &known, near);
+    hopes
 }
 
 /// Windows that cover these, in which closing takes less work: each is closed with `reach` samples around it.
@@ -105,8 +132,15 @@ fn together(mut windows: Vec<Window>, reach: usize) -> Vec<Window> {
     windows
 }
 
-/// The samples of some blocks at which `lowest` stands above both the design and the least of its block.
-fn lower(least: &Heights, blocks: Window, lowest: &Heights, design: &Heights) -> Option<Window> {
+/// The samples of some blocks at which `lowest` stands above both the design and the least of its block; the highest
+/// of them in each block goes to `tops`.
+fn lower(
+    least: &Heights,
+    blocks: Window,
+    lowest: &Heights,
+    design: &Heights,
+    tops: &mut Heights,
+) -> Option<Window> {
     let mut found: Option<[i64; 4]> = None;
     for row in blocks.row..blocks.row_end() {
         for column in blocks.column..blocks.column_end() {
@@ -123,12 +157,17 @@ fn lower(least: &Heights, blocks: Window, lowest: &Heights, design: &Heights) ->
                     line
                 })
             };
-            let could = (part.row..part.row_end()).any(|row| {
+            let mut top = f32::NEG_INFINITY;
+            for row in part.row..part.row_end() {
                 let (lowest, design) = (cut(lowest, row), cut(design, row));
                 // Without branches, so that all of them are looked at together.
-                lowest.iter().zip(&design).fold(false, |any, (z, design)| any | ((z > design) & (*z > bound)))
-            });
-            if could {
+                top = lowest.iter().zip(&design).fold(top, |top, (z, design)| {
+                    if (z > design) & (*z > bound) & (*z > top) { *z } else { top }
+                });
+            }
+            if top > f32::NEG_INFINITY {
+                let at = (row - tops.window.row) as usize * tops.window.columns;
+                tops.z_mm[at + (column - tops.window.column) as usize] = top;
                 let ends = [part.column, part.row, part.column_end(), part.row_end()];
                 let all = |f: [i64; 4]| {
                     [f[0].min(ends[0]), f[1].min(ends[1]), f[2].max(ends[2]), f[3].max(ends[3])]
@@ -143,80 +182,6 @@ fn lower(least: &Heights, blocks: Window, lowest: &Heights, design: &Heights) ->
         columns: (column_end - column) as usize,
         rows: (row_end - row) as usize,
     })
-}
-
-/// The lowest that a cutter which stands no lower than this leaves of any sample of each block.
-fn eroded(shape: &Shape, step_mm: f64, standing: &Heights, out: Window, reach: i64) -> Heights {
-    let mut least = Heights { window: out, z_mm: vec![f32::INFINITY; out.samples()] };
-    let offsets = offsets(shape, step_mm, reach, |blocks| (blocks * BLOCK - BLOCK + 1).max(0));
-    over_offsets(&mut least, standing, &offsets, lower_row);
-    least
-}
-
-/// Takes into each block of `to` those of `from` at these offsets, by rows of it.
-fn over_offsets(
-    to: &mut Heights,
-    from: &Heights,
-    offsets: &[([i64; 2], f32)],
-    take: impl Fn(&mut [f32], &[f32], f32),
-) {
-    let window = to.window;
-    let at = |row: i64, column: i64| {
-        (row - from.window.row) as usize * from.window.columns + (column - from.window.column) as usize
-    };
-    // A flat's offsets are runs in which all rise alike: what a run holds is what two runs of a power of two hold.
-    if offsets.iter().all(|(_, rise)| *rise == 0.0) {
-        let runs: Vec<(i64, i64)> =
-            offsets.chunk_by(|a, b| a.0[1] == b.0[1]).map(|run| (run[0].0[1], 1 - 2 * run[0].0[0])).collect();
-        let longest = runs.iter().map(|(_, length)| *length).max().unwrap_or(1);
-        let mut doubled = vec![from.z_mm.clone()];
-        for level in 0..longest.ilog2() as usize {
-            let mut next = doubled[level].clone();
-            let by = 1 << level;
-            let count = next.len().saturating_sub(by);
-            // Runs past the end of a row are not looked at.
-            take(&mut next[..count], &doubled[level][by..], 0.0);
-            doubled.push(next);
-        }
-        for row in window.row..window.row_end() {
-            let start = (row - window.row) as usize * window.columns;
-            let to = &mut to.z_mm[start..start + window.columns];
-            for &(up, length) in &runs {
-                let level = length.ilog2() as usize;
-                let first = window.column - (length - 1) / 2;
-                for first in [first, first + length - (1 << level)] {
-                    take(to, &doubled[level][at(row + up, first)..][..window.columns], 0.0);
-                }
-            }
-        }
-        return;
-    }
-    for row in window.row..window.row_end() {
-        let start = (row - window.row) as usize * window.columns;
-        let to = &mut to.z_mm[start..start + window.columns];
-        for &([across, up], rise) in offsets {
-            take(to, &from.z_mm[at(row + up, window.column + across)..][..window.columns], rise);
-        }
-    }
-}
-
-/// Every offset between blocks within the cutter, and the cutter's rise there, less or more its rounding; `samples`
-/// gives the distance along an axis that counts for blocks so far apart.
-fn offsets(shape: &Shape, step_mm: f64, reach: i64, samples: impl Fn(i64) -> i64) -> Vec<([i64; 2], f32)> {
-    // Of the samples' distances the nearest counts with the lower rise, the farthest with the higher.
-    let nearest = samples(0) == 0;
-    let mut out = Vec::new();
-    for up in -reach..=reach {
-        for across in -reach..=reach {
-            let [x, y] = [across, up].map(|blocks| samples(blocks.abs()) as f64 * step_mm);
-            let r_mm = x.hypot(y);
-            let inside = if nearest { r_mm - 1e-9 } else { r_mm + 1e-9 };
-            let Some(rise) = shape.height_mm(inside.max(0.0)) else { continue };
-            let rounded = if rise == 0.0 { 0.0 } else { ROUNDED_MM };
-            out.push(([across, up], (if nearest { rise - rounded } else { rise + rounded }) as f32));
-        }
-    }
-    out
 }
 
 /// The blocks that a window touches.
@@ -238,7 +203,7 @@ fn higher(most: f32, z: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compensation::{Profile, closing};
+    use crate::compensation::{Closings, Profile, Tables, closing};
 
     const STEP_MM: f64 = 0.02;
 
@@ -280,10 +245,23 @@ mod tests {
             };
             let (lowest, closed) = (closing(&around, &known, inner), closing(&around, &tried, inner));
             let design = around.crop(inner);
-            let within = peaks.lower_within(&shapes[0], STEP_MM, &lowest, &design);
+            let Lower { within, marks } = peaks.lower_within(&shapes[0], STEP_MM, &lowest, &design);
+            let tables = Tables::new(tried);
+            let mut closings = Closings::new();
+            let marked = marks
+                .as_ref()
+                .map(|[stands, marks]| closings.of_flat_at(&around, &tables, inner, [stands, marks]));
+            assert_eq!(marked.is_some(), name.starts_with("flat"));
             for row in inner.row..inner.row_end() {
                 let lines = closed.row(row).iter().zip(lowest.row(row)).zip(design.row(row));
                 for (column, ((a, b), z)) in (inner.column..).zip(lines) {
+                    let marked = marked.map(|closed| closed.row(row)[(column - inner.column) as usize]);
+                    if let Some(marked) = marked {
+                        assert!(
+                            marked.min(*b).max(*z) == a.min(*b).max(*z),
+                            "{name} at {column}, {row}: {marked}, {a}"
+                        );
+                    }
                     let inside = within.iter().any(|w| {
                         (w.column..w.column_end()).contains(&column) && (w.row..w.row_end()).contains(&row)
                     });
@@ -305,10 +283,10 @@ mod tests {
         let mut lowest = floor.crop(inner);
         let design = lowest.clone();
         let peaks = Peaks::of(&floor);
-        assert!(peaks.lower_within(&flat, STEP_MM, &lowest, &design).is_empty());
+        assert!(peaks.lower_within(&flat, STEP_MM, &lowest, &design).within.is_empty());
         // Nor where something else stands in the way, but where the other cutter leaves more than this one would.
         lowest.z_mm[50 * 100 + 50] = -0.9;
-        let within = peaks.lower_within(&flat, STEP_MM, &lowest, &design);
+        let within = peaks.lower_within(&flat, STEP_MM, &lowest, &design).within;
         let one = Window { column: 200, row: 200, columns: 8, rows: 8 };
         assert_eq!(within, [one]);
     }

@@ -8,13 +8,14 @@ pub mod cavities;
 mod histogram;
 pub mod light;
 mod normals;
+mod offsets;
 mod outline;
 mod pixels;
 pub mod polish;
 mod rounding;
 mod tally;
 
-pub use bound::Peaks;
+pub use bound::{Lower, Peaks};
 pub use cavities::{Cavities, Cavity, Found};
 pub use histogram::Histogram;
 pub use outline::Outline;

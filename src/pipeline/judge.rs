@@ -8,7 +8,7 @@ use super::light::{self, Sight};
 use crate::compensation::{self, Closings, Profile, RowPass, RowTarget, Tables};
 use crate::fidelity::cavities::{self, Labelled};
 use crate::fidelity::light::LightTally;
-use crate::fidelity::{self, Cavities, Found, Layers, Peaks, Pixels, Tally, polish};
+use crate::fidelity::{self, Cavities, Found, Layers, Lower, Peaks, Pixels, Tally, polish};
 use crate::grid::{Heights, Lattice, Window};
 use crate::progress::Progress;
 use crate::surface::Surface;
@@ -360,8 +360,16 @@ impl Case<'_> {
         for tables in others {
             let peaks = peaks.get_or_insert_with(|| Peaks::of(around));
             let step_mm = self.surface.lattice().step_mm;
-            for within in peaks.lower_within(&tables.profile().shape(), step_mm, &lowest, design) {
-                lower(&mut lowest, closings.of(around, tables, within));
+            let Lower { within, marks } =
+                peaks.lower_within(&tables.profile().shape(), step_mm, &lowest, design);
+            for within in within {
+                let closed = match &marks {
+                    Some([positions, marked]) => {
+                        closings.of_flat_at(around, tables, within, [positions, marked])
+                    }
+                    None => closings.of(around, tables, within),
+                };
+                lower(&mut lowest, closed);
             }
         }
         compensation::residual(&lowest, design)
