@@ -43,6 +43,7 @@ impl Line {
 }
 
 /// A sum that need not wait for each addend.
+#[inline(always)]
 pub(super) fn total(values: &[f64]) -> f64 {
     let (eights, rest) = values.as_chunks::<8>();
     let mut sums = [0.0; 8];

@@ -54,6 +54,64 @@ impl Reflectance {
     }
 }
 
+/// A reflectance as a polynomial of the cosine, for angles that are not flat: roots and quotients take several times as
+/// long.
+#[derive(Clone, Copy, Debug)]
+pub struct Series {
+    /// Of powers of x, with x = -1 at [`Series::LEAST_COSINE`] and 1 at a cosine of 1.
+    powers: [f64; Series::TERMS],
+}
+
+impl Series {
+    /// Holds from here to a cosine of 1.
+    pub const LEAST_COSINE: f64 = 0.5;
+    const TERMS: usize = 18;
+    /// The last terms are less than this.
+    const NEGLIGIBLE: f64 = 1e-13;
+
+    /// Interpolates at Chebyshev's points; None where so many terms do not show the reflectance.
+    pub fn of(reflectance: &Reflectance) -> Option<Series> {
+        let (count, middle) = (Self::TERMS as f64, 0.5 * (1.0 + Self::LEAST_COSINE));
+        let half = 1.0 - middle;
+        let angle = |k: usize| std::f64::consts::PI * (k as f64 + 0.5) / count;
+        let values: [f64; Self::TERMS] =
+            std::array::from_fn(|k| reflectance.at(middle + half * angle(k).cos()));
+        let terms: [f64; Self::TERMS] = std::array::from_fn(|j| {
+            let sum: f64 =
+                values.iter().enumerate().map(|(k, value)| value * (j as f64 * angle(k)).cos()).sum();
+            sum * if j == 0 { 1.0 } else { 2.0 } / count
+        });
+        // NaN is not less.
+        if !terms[Self::TERMS - 2..].iter().all(|term| term.abs() < Self::NEGLIGIBLE) {
+            return None;
+        }
+        // T(j + 1) = 2 x T(j) - T(j - 1)
+        let (mut last, mut polynomial) = ([0.0; Self::TERMS], [0.0; Self::TERMS]);
+        polynomial[0] = 1.0;
+        let mut powers = [0.0; Self::TERMS];
+        for (j, term) in terms.iter().enumerate() {
+            for (power, p) in powers.iter_mut().zip(&polynomial) {
+                *power += term * p;
+            }
+            let mut next = [0.0; Self::TERMS];
+            for k in 1..Self::TERMS {
+                next[k] = polynomial[k - 1] * if j == 0 { 1.0 } else { 2.0 };
+            }
+            next.iter_mut().zip(&last).for_each(|(next, last)| *next -= last);
+            (last, polynomial) = (polynomial, next);
+        }
+        Some(Series { powers })
+    }
+
+    /// The reflectance at a cosine.
+    #[inline(always)]
+    pub fn at(&self, cosine: f64) -> f64 {
+        let half = 0.5 * (1.0 - Self::LEAST_COSINE);
+        let x = (cosine - (1.0 - half)) * (1.0 / half);
+        self.powers.iter().rev().fold(0.0, |sum, power| sum * x + power)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,5 +147,18 @@ mod tests {
         assert!((normal - 0.9110).abs() < 1e-4);
         assert!((ALUMINIUM.reflectance(45f64.to_radians().cos()) / normal - 1.0).abs() < 0.005);
         assert!((ALUMINIUM.reflectance(60f64.to_radians().cos()) / normal - 1.0).abs() < 0.017);
+    }
+    #[test]
+    fn a_series_is_the_reflectance() {
+        for reflectance in [Reflectance::Metal(ALUMINIUM), Reflectance::Constant(0.7)] {
+            let series = Series::of(&reflectance).expect("it converges");
+            for k in 0..=1000 {
+                let cosine = Series::LEAST_COSINE + (1.0 - Series::LEAST_COSINE) * f64::from(k) / 1000.0;
+                let apart = series.at(cosine) - reflectance.at(cosine);
+                assert!(apart.abs() < 1e-12, "{cosine} {apart:e}");
+            }
+        }
+        // Total reflection inside a thin medium has a corner.
+        assert!(Series::of(&Reflectance::Metal(ComplexIndex { n: 0.6, k: 0.0 })).is_none());
     }
 }

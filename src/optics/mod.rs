@@ -4,7 +4,7 @@ mod fresnel;
 mod lobe;
 mod solid_angle;
 
-pub use fresnel::{ComplexIndex, Reflectance};
+pub use fresnel::{ComplexIndex, Reflectance, Series};
 pub use lobe::Lobe;
 pub use solid_angle::{even_gain, projected_solid_angle};
 

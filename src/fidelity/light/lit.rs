@@ -9,7 +9,7 @@ use super::row::Chunk;
 use super::tally::{LightTally, ROOM_BINS};
 use super::view::bin_of;
 use super::{End, Pose, Relief, Room, Stage};
-use crate::fidelity::pixels::{Line, Pixels, total};
+use crate::fidelity::pixels::{Line, Pixels};
 use crate::grid::{Heights, Window};
 
 /// Bounces that are followed; light that has not left by then is unresolved.
@@ -111,18 +111,10 @@ impl<'a> Lit<'a> {
         count: usize,
         line: &mut Option<Line>,
     ) {
-        let nothing = [0.0; Chunk::SAMPLES];
-        let (mut taken, mut reflected, mut arrived) = (nothing, nothing, nothing);
-        let mut done = 0;
-        for k in 0..count {
-            let on = chunk.done[k];
-            done += usize::from(on);
-            taken[k] = if on { chunk.taken[k] } else { 0.0 };
-            reflected[k] = if on { chunk.reflected[k] } else { 0.0 };
-            arrived[k] = if chunk.met[k] >= 0.0 { reflected[k] } else { 0.0 };
-        }
-        let [taken, reflected, arrived] = [&taken[..count], &reflected[..count], &arrived[..count]];
-        let [all, left, met] = [taken, reflected, arrived].map(total);
+        let done = chunk.done[..count].iter().filter(|done| **done).count();
+        let [taken, reflected, arrived] =
+            [&chunk.taken, &chunk.reflected, &chunk.arrived].map(|row| &row[..count]);
+        let [all, left, met] = chunk.sums;
         tally.samples += done as u64;
         tally.incident += all;
         tally.absorbed += all - left;

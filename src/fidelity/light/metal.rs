@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use crate::optics::{ComplexIndex, Lobe, Reflectance};
+use crate::optics::{Lobe, Reflectance, Series};
 
 /// Lobes narrower than this are mirrors.
 const MIRROR: f64 = 1e-4;
@@ -12,7 +12,9 @@ const MIRROR: f64 = 1e-4;
 /// is reciprocal. Of the microfacets' light the part that meets another of them is not followed.
 #[derive(Clone, Copy, Debug)]
 pub struct Metal {
-    reflectance: Reflectance,
+    pub(super) reflectance: Reflectance,
+    /// The same by a polynomial, if it can be shown by one.
+    pub(super) series: Option<Series>,
     lobe: Option<Lobe>,
     diffuse: f64,
 }
@@ -31,20 +33,13 @@ pub struct Scattered {
 impl Metal {
     /// `roughness` is the lobe's alpha, None a mirror; `diffuse` the matte part of what is reflected.
     pub fn new(reflectance: Reflectance, roughness: Option<f64>, diffuse: f64) -> Metal {
-        Metal { reflectance, lobe: roughness.filter(|alpha| *alpha > MIRROR).map(Lobe::new), diffuse }
+        let lobe = roughness.filter(|alpha| *alpha > MIRROR).map(Lobe::new);
+        Metal { reflectance, series: Series::of(&reflectance), lobe, diffuse }
     }
 
     /// The same metal as a perfect mirror.
     pub fn polished(&self) -> Metal {
         Metal { lobe: None, diffuse: 0.0, ..*self }
-    }
-
-    /// The reflectance as a + b F, with F that of a refractive index n + i k: [n, k], then [a, b].
-    pub(super) fn by_index(&self) -> [[f64; 2]; 2] {
-        match self.reflectance {
-            Reflectance::Metal(ComplexIndex { n, k }) => [[n, k], [0.0, 1.0]],
-            Reflectance::Constant(value) => [[1.0, 1.0], [value, 0.0]],
-        }
     }
 
     /// Whether light from one direction leaves in one direction.
@@ -106,6 +101,7 @@ pub(crate) fn draw(column: i64, row: i64, bounce: u64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optics::ComplexIndex;
 
     const ALUMINIUM: ComplexIndex = ComplexIndex { n: 1.0, k: 6.4 };
 
