@@ -281,6 +281,7 @@ pub(super) struct Piece {
 /// The lower envelope along the row at `y` of planes sorted by falling slope, from left to right:
 /// in fixed y every plane is a line, and a line enters the lower envelope in the order of falling
 /// slopes, so one stack suffices. The first piece starts at minus infinity.
+#[inline]
 pub(super) fn along_row(planes: &[Plane], y: f64, pieces: &mut Vec<Piece>) {
     pieces.clear();
     for plane in planes {

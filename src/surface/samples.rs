@@ -47,7 +47,8 @@ impl Designed {
             (rest, row) = (after, end);
         }
         strips.into_par_iter().for_each_init(Scratch::default, |scratch, (row, strip)| {
-            self.fill_strip(&xs, &runs, row, strip, datum_mm, scratch);
+            let (xs, runs) = (xs.as_slice(), runs.as_slice());
+            pulp::Arch::new().dispatch(move || self.fill_strip(xs, runs, row, strip, datum_mm, scratch));
         });
         heights
     }
@@ -66,6 +67,8 @@ impl Designed {
         runs
     }
 
+    /// Inlined into what is compiled for wide vectors, as what it calls.
+    #[inline(always)]
     fn fill_strip(
         &self,
         xs: &[f64],
@@ -142,31 +145,35 @@ impl Designed {
         true
     }
 
+    #[inline(always)]
     fn fill_row(&self, xs: &[f64], y: f64, out: &mut [f32], datum_mm: f64, scratch: &mut Scratch) {
         let Scratch { shapes, pieces, own, best, .. } = scratch;
         let sign = self.sign;
         let Some((first, others)) = shapes.split_first() else { return };
         along_row(&first.planes, y - first.centre[1], pieces);
+        // Copied, so that nothing that is read can be what is written.
+        let (centre, elevation) = (first.centre[0], first.elevation);
         if others.is_empty() {
-            self.spans(pieces, xs, first.centre[0], |piece, from, to| {
+            self.spans(pieces, xs, centre, |Piece { slope, intercept, .. }, from, to| {
                 for (z, x) in out[from..to].iter_mut().zip(&xs[from..to]) {
-                    let on = piece.slope * (x - first.centre[0]) + piece.intercept;
-                    *z = (sign * (on + first.elevation) - datum_mm) as f32;
+                    let on = slope * (x - centre) + intercept;
+                    *z = (sign * (on + elevation) - datum_mm) as f32;
                 }
             });
             return;
         }
         own.resize(xs.len(), 0.0);
-        self.spans(pieces, xs, first.centre[0], |piece, from, to| {
+        self.spans(pieces, xs, centre, |Piece { slope, intercept, .. }, from, to| {
             for (z, x) in own[from..to].iter_mut().zip(&xs[from..to]) {
-                *z = piece.slope * (x - first.centre[0]) + piece.intercept + first.elevation;
+                *z = slope * (x - centre) + intercept + elevation;
             }
         });
         best.clone_from(own);
         for shape in others {
             along_row(&shape.planes, y - shape.centre[1], pieces);
-            self.spans(pieces, xs, shape.centre[0], |piece, from, to| {
-                let at = |x: f64| piece.slope * (x - shape.centre[0]) + piece.intercept + shape.elevation;
+            let (centre, elevation) = (shape.centre[0], shape.elevation);
+            self.spans(pieces, xs, centre, |Piece { slope, intercept, .. }, from, to| {
+                let at = |x: f64| slope * (x - centre) + intercept + elevation;
                 // The cell's own function is concave, so over a span it is lowest at an end.
                 if at(xs[from]).max(at(xs[to - 1])) <= own[from].min(own[to - 1]) {
                     return;
@@ -182,14 +189,15 @@ impl Designed {
     }
 
     /// The samples of each piece: those at or past its start and before the next one's.
-    fn spans(&self, pieces: &[Piece], xs: &[f64], centre: f64, mut each: impl FnMut(&Piece, usize, usize)) {
+    #[inline(always)]
+    fn spans(&self, pieces: &[Piece], xs: &[f64], centre: f64, mut each: impl FnMut(Piece, usize, usize)) {
         let step = self.lattice.step_mm;
         let mut from = 0;
         for (index, piece) in pieces.iter().enumerate() {
             let to = match pieces.get(index + 1) {
                 None => xs.len(),
                 Some(next) => {
-                    let guess = ((next.start + centre - xs[0]) / step).ceil();
+                    let guess = (next.start + centre - xs[0]) / step;
                     let mut to = (guess.max(0.0) as usize).clamp(from, xs.len());
                     while to > from && xs[to - 1] - centre >= next.start {
                         to -= 1;
@@ -201,7 +209,7 @@ impl Designed {
                 }
             };
             if to > from {
-                each(piece, from, to);
+                each(*piece, from, to);
                 from = to;
             }
             if from == xs.len() {

@@ -123,13 +123,13 @@ impl Blank {
             let at = (index as f64 + 0.5) * step_mm;
             (self.low_mm[axis] - 1e-9..=self.high_mm[axis] + 1e-9).contains(&at)
         };
-        for (row, z) in heights.z_mm.chunks_exact_mut(window.columns.max(1)).enumerate() {
+        // Those inside are side by side.
+        let first = (0..window.columns).position(|column| inside(window.column + column as i64, 0));
+        let last = (0..window.columns).rposition(|column| inside(window.column + column as i64, 0));
+        let (Some(first), Some(last)) = (first, last) else { return heights };
+        for (row, z) in heights.z_mm.chunks_exact_mut(window.columns).enumerate() {
             if inside(window.row + row as i64, 1) {
-                for (column, z) in z.iter_mut().enumerate() {
-                    if inside(window.column + column as i64, 0) {
-                        *z = top;
-                    }
-                }
+                z[first..=last].fill(top);
             }
         }
         heights
