@@ -59,7 +59,7 @@ impl Peaks {
                 found.extend(lower(&least, piece, lowest, design, &mut tops));
             }
         }
-        let is_flat = near.iter().all(|(_, rise)| *rise == 0.0);
+        let is_flat = matches!(shape, Shape::Flat { .. });
         let marks = (is_flat && !found.is_empty()).then(|| {
             let hopes = hopes(&tops, standing.window, reach as usize, &near);
             let could = hopes.z_mm.iter().zip(&standing.z_mm).map(|(hope, stands)| stands < hope).collect();
@@ -231,6 +231,8 @@ mod tests {
             ("flat:2", "ball:0.4"),
             ("ball:1.6", "flat:0.6"),
             ("bull:1:0.2", "ball:0.4"),
+            // Its corner lies between the places that blocks are looked at.
+            ("bull:1.1:0.002", "ball:0.4"),
             ("vee:90:0.1:1", "ball:0.8"),
         ] {
             let shapes = [name, other].map(|text| text.parse::<Shape>().expect("a cutter"));
