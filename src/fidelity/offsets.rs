@@ -18,6 +18,7 @@ pub(super) type Offset = ([i64; 2], f32);
 pub(super) fn offsets(shape: &Shape, step_mm: f64, reach: i64, samples: impl Fn(i64) -> i64) -> Vec<Offset> {
     // Of the samples' distances the nearest counts with the lower rise, the farthest with the higher.
     let nearest = samples(0) == 0;
+    let rounded = if matches!(shape, Shape::Flat { .. }) { 0.0 } else { ROUNDED_MM };
     let mut out = Vec::new();
     for up in -reach..=reach {
         for across in -reach..=reach {
@@ -25,7 +26,6 @@ pub(super) fn offsets(shape: &Shape, step_mm: f64, reach: i64, samples: impl Fn(
             let r_mm = x.hypot(y);
             let inside = if nearest { r_mm - 1e-9 } else { r_mm + 1e-9 };
             let Some(rise) = shape.height_mm(inside.max(0.0)) else { continue };
-            let rounded = if rise == 0.0 { 0.0 } else { ROUNDED_MM };
             out.push(([across, up], (if nearest { rise - rounded } else { rise + rounded }) as f32));
         }
     }
