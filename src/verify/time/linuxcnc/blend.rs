@@ -243,7 +243,6 @@ impl RoundedCorner {
             speed: 0.0,
             ramp: false,
             ending: None,
-            period: limits.period,
             done: false,
             braking: false,
             handing_over: false,

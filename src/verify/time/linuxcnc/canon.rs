@@ -185,7 +185,6 @@ impl Controller {
             speed: 0.0,
             ramp: false,
             ending: None,
-            period: self.limits.period,
             done: false,
             braking: false,
             handing_over: false,

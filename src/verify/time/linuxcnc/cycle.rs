@@ -16,29 +16,37 @@ const CLEAR: f64 = 1.0 - 1e-9;
 const OVER: f64 = 1.0 + 1e-9;
 
 impl Controller {
-    /// One cycle of the servo loop, or up to `most` at once while nothing changes.
-    pub(super) fn cycle(&mut self, most: u64) {
+    /// One cycle of the servo loop.
+    pub(super) fn cycle(&mut self) {
+        self.run_head(1, true);
+    }
+
+    /// Runs until no more than `longest` segments wait, cycles in which nothing changes at once.
+    pub(super) fn run(&mut self, longest: usize) {
+        while self.queue.len() > longest {
+            self.run_head(u32::MAX, false);
+        }
+    }
+
+    /// Runs up to `most` cycles of the first segment at once, all that it has or `once`.
+    #[inline(always)]
+    fn run_head(&mut self, most: u32, once: bool) {
         let limits = self.limits;
         let mut segments = self.queue.iter_mut();
         let Some(head) = segments.next() else { return };
         let (mut next, after) = (segments.next(), segments.next());
         activate(head, &limits);
-        let mut cycles = 1;
-        if head.ending.is_some() {
-            hand_over(head, next, after.as_deref(), &limits);
-        } else {
-            head.period = limits.period;
-            let bounds = Bounds::of(head, next.as_deref(), &limits);
-            cycles += cruise(head, &bounds, &limits, most - 1);
-            if head.ramp {
-                cycles += change_evenly(head, &bounds, &limits, most - cycles);
+        let bounds = Bounds::of(head, next.as_deref(), &limits);
+        let mut cycles = 0;
+        loop {
+            if head.ending.is_some() {
+                hand_over(head, next.as_deref_mut(), after.as_deref(), &limits);
+                cycles += 1;
             } else {
-                cycles += speed_up(head, &bounds, &limits, most - cycles);
-                cycles += slow_down(head, next.as_deref_mut(), &bounds, &limits, most - cycles);
+                cycles += u64::from(advance(head, next.as_deref_mut(), &bounds, &limits, most));
             }
-            step(head, &bounds, &limits);
-            if let (End::Parabola, Some(next)) = (head.end, next) {
-                parabola(head, next, &limits);
+            if head.done || once {
+                break;
             }
         }
         if head.rapid {
@@ -50,6 +58,29 @@ impl Controller {
             self.queue.pop_front();
         }
     }
+}
+
+/// One cycle, or up to `most` while nothing changes.
+#[inline(always)]
+fn advance(
+    head: &mut Segment,
+    mut next: Option<&mut Segment>,
+    bounds: &Bounds,
+    limits: &Limits,
+    most: u32,
+) -> u32 {
+    let mut cycles = 1 + cruise(head, bounds, limits, most - 1);
+    if head.ramp {
+        cycles += change_evenly(head, bounds, limits, most - cycles);
+    } else {
+        cycles += speed_up(head, bounds, limits, most - cycles);
+        cycles += slow_down(head, next.as_deref_mut(), bounds, limits, most - cycles);
+    }
+    step(head, bounds, limits, limits.period);
+    if let (End::Parabola, Some(next)) = (head.end, next) {
+        parabola(head, next, limits);
+    }
+    cycles
 }
 
 fn activate(head: &mut Segment, limits: &Limits) {
@@ -93,7 +124,7 @@ impl Bounds {
 
 /// Runs whole cycles at an even speed, as long as braking is not due: it begins
 /// (v^2 - end^2) / 2a + v T before the end.
-fn cruise(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> u64 {
+fn cruise(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u32) -> u32 {
     let speed = head.speed;
     if most == 0 || head.handing_over || speed <= 0.0 {
         return 0;
@@ -101,7 +132,7 @@ fn cruise(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> u6
     let end = bounds.end;
     let step = speed * limits.period;
     let left = head.left();
-    let cycles = if even(head, bounds, left) {
+    let cycles = if even(head, bounds, left, limits.period) {
         left / step - 1.0
     } else if !head.ramp && speed == bounds.asked {
         (left - (speed * speed - end * end).max(0.0) / (2.0 * bounds.along)) / step - 2.0
@@ -111,14 +142,14 @@ fn cruise(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> u6
     if cycles < 1.0 {
         return 0;
     }
-    let cycles = (cycles as u64).min(most);
-    head.progress += cycles as f64 * step;
+    let cycles = (cycles as u32).min(most);
+    head.progress += f64::from(cycles) * step;
     cycles
 }
 
 /// Runs whole cycles of [`step`] at full acceleration, bit by bit what they come to, as long as they are clear of what
 /// ends that by more than rounding: the speed asked for, braking and the end.
-fn speed_up(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> u64 {
+fn speed_up(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u32) -> u32 {
     if head.handing_over {
         return 0;
     }
@@ -152,8 +183,8 @@ fn slow_down(
     next: Option<&mut Segment>,
     bounds: &Bounds,
     limits: &Limits,
-    most: u64,
-) -> u64 {
+    most: u32,
+) -> u32 {
     let &Bounds { end, asked, along } = bounds;
     let gain = along * limits.period;
     let half = 0.5 * gain;
@@ -171,19 +202,19 @@ fn slow_down(
     if !(1.0..1e9).contains(&cycles) {
         return 0;
     }
-    let mut cycles = (cycles as u64).min(most);
+    let mut cycles = (cycles as u32).min(most);
     if head.handing_over {
         let Some(next) = next else { return 0 };
         cycles = speed_up(next, &Bounds::of(next, None, limits), limits, cycles);
     }
-    head.progress += cycles as f64 * limits.period * (head.speed - half * cycles as f64);
-    head.speed -= cycles as f64 * gain;
+    head.progress += f64::from(cycles) * limits.period * (head.speed - half * f64::from(cycles));
+    head.speed -= f64::from(cycles) * gain;
     head.braking |= cycles > 0;
     cycles
 }
 
 /// Runs whole cycles of a short segment that goes from its speed to the one at its end with one acceleration.
-fn change_evenly(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64) -> u64 {
+fn change_evenly(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u32) -> u32 {
     let &Bounds { end, along, .. } = bounds;
     if most == 0 || head.end != End::Tangent || end < NO_SPEED {
         return 0;
@@ -194,9 +225,9 @@ fn change_evenly(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u64
     if !(1.0..1e9).contains(&cycles) || gain.abs() > along * limits.period * CLEAR {
         return 0;
     }
-    let cycles = (cycles as u64).min(most);
-    let speed = head.speed + cycles as f64 * gain;
-    head.progress += 0.5 * (head.speed + speed) * cycles as f64 * limits.period;
+    let cycles = (cycles as u32).min(most);
+    let speed = head.speed + f64::from(cycles) * gain;
+    head.progress += 0.5 * (head.speed + speed) * f64::from(cycles) * limits.period;
     head.speed = speed;
     head.braking = false;
     cycles
@@ -208,27 +239,27 @@ fn far_from_end(left: f64, speed: f64, end: f64, gain: f64, limits: &Limits) -> 
 }
 
 /// One step of a segment over its period.
-fn step(segment: &mut Segment, bounds: &Bounds, limits: &Limits) {
+fn step(segment: &mut Segment, bounds: &Bounds, limits: &Limits, period: f64) {
     let &Bounds { end, along, .. } = bounds;
     let left = segment.left();
-    if even(segment, bounds, left) {
-        return coast(segment, limits);
+    if even(segment, bounds, left, period) {
+        return coast(segment, limits, period);
     }
     let (acceleration, desired) = if segment.ramp && segment.end == End::Tangent && end >= NO_SPEED {
         let mean = 0.5 * (segment.speed + end);
         let time = if mean > NO_SPEED { (left / mean).max(1e-16) } else { 1e-16 };
         (within((end - segment.speed) / time, along), end)
     } else {
-        trapezoid(segment, bounds, left)
+        trapezoid(segment, bounds, left, period)
     };
-    let speed = segment.speed + acceleration * segment.period;
+    let speed = segment.speed + acceleration * period;
     if speed < 0.0 {
-        if left < segment.speed * segment.period {
+        if left < segment.speed * period {
             segment.progress = segment.length;
         }
         segment.speed = 0.0;
     } else {
-        let way = 0.5 * (speed + segment.speed) * segment.period;
+        let way = 0.5 * (speed + segment.speed) * period;
         segment.progress = lesser(segment.progress + way, segment.length);
         segment.speed = speed;
     }
@@ -237,19 +268,18 @@ fn step(segment: &mut Segment, bounds: &Bounds, limits: &Limits) {
 }
 
 /// Whether nothing changes the speed from here to the end.
-fn even(segment: &Segment, bounds: &Bounds, left: f64) -> bool {
+fn even(segment: &Segment, bounds: &Bounds, left: f64, period: f64) -> bool {
     let end = bounds.end;
     segment.speed == end
         && end > NO_SPEED
-        && (segment.ramp || segment.speed == bounds.asked && left >= end * segment.period)
+        && (segment.ramp || segment.speed == bounds.asked && left >= end * period)
 }
 
 /// What [`step`] comes to at an even speed.
-fn coast(segment: &mut Segment, limits: &Limits) {
+fn coast(segment: &mut Segment, limits: &Limits, period: f64) {
     let speed = segment.speed;
-    segment.progress = lesser(segment.progress + speed * segment.period, segment.length);
+    segment.progress = lesser(segment.progress + speed * period, segment.length);
     segment.braking = false;
-    segment.period = limits.period;
     let left = segment.left();
     if left <= SAME_PLACE {
         segment.progress = segment.length;
@@ -260,15 +290,19 @@ fn coast(segment: &mut Segment, limits: &Limits) {
 }
 
 /// Acceleration of a step, and the speed from which the end can just be braked for.
-fn trapezoid(segment: &Segment, bounds: &Bounds, left: f64) -> (f64, f64) {
+fn trapezoid(segment: &Segment, bounds: &Bounds, left: f64, period: f64) -> (f64, f64) {
     let &Bounds { end, asked, along } = bounds;
-    let half = 0.5 * along * segment.period;
-    let root = end * end + along * (2.0 * left - segment.speed * segment.period) + half * half;
+    let half = 0.5 * along * period;
+    let root = end * end + along * (2.0 * left - segment.speed * period) + half * half;
+    // What is clear of its limits does not wait for a root and a division; while it speeds up, no one asks for the second.
+    let period = greater(period, NO_TIME);
+    let gain = along * period * OVER;
+    let reach = (segment.speed + gain) * OVER;
+    if reach < asked && (reach + half) * (reach + half) * OVER < root {
+        return (along, asked);
+    }
     let most = if root > half * half { root.sqrt() - half } else { -half };
     let change = within(most, asked) - segment.speed;
-    let period = greater(segment.period, NO_TIME);
-    let gain = along * period * OVER;
-    // What is clear of the limit does not wait for a root and a division.
     let acceleration = if change > gain {
         along
     } else if change < -gain {
@@ -281,7 +315,6 @@ fn trapezoid(segment: &Segment, bounds: &Bounds, left: f64) -> (f64, f64) {
 
 /// Whether the segment ends before the next cycle does, and when (tp.c: tpCheckEndCondition).
 fn look_for_end(segment: &mut Segment, end: f64, along: f64, limits: &Limits) {
-    segment.period = limits.period;
     let left = segment.left();
     let stops = matches!(segment.end, End::Stop | End::Exact);
     if left <= SAME_PLACE {
@@ -299,9 +332,8 @@ fn look_for_end(segment: &mut Segment, end: f64, along: f64, limits: &Limits) {
     }
     let mut time = (left / mean).max(0.5 * NO_TIME);
     let mut speed = end;
-    let needed = (end - segment.speed) / time;
-    if needed.abs() > along {
-        let a = along.copysign(needed);
+    if needs_more(end - segment.speed, mean, left, time, along) {
+        let a = along.copysign(end - segment.speed);
         let root = (segment.speed / a).powi(2) + 2.0 / a * left;
         if root < 0.0 {
             return;
@@ -318,6 +350,19 @@ fn look_for_end(segment: &mut Segment, end: f64, along: f64, limits: &Limits) {
     }
 }
 
+/// Whether a change of speed in this time, `left / mean`, needs more acceleration than there is.
+fn needs_more(change: f64, mean: f64, left: f64, time: f64, along: f64) -> bool {
+    // Both sides times the way: what is clear does not wait for divisions.
+    let (needed, most) = (change.abs() * mean, along * left);
+    if needed < most * CLEAR {
+        return false;
+    }
+    if needed > most * OVER && left > NO_TIME * mean {
+        return true;
+    }
+    (change / time).abs() > along
+}
+
 /// The cycle in which one segment ends and the next begins.
 fn hand_over(head: &mut Segment, next: Option<&mut Segment>, after: Option<&Segment>, limits: &Limits) {
     if head.done {
@@ -327,11 +372,12 @@ fn hand_over(head: &mut Segment, next: Option<&mut Segment>, after: Option<&Segm
     head.progress = head.length;
     head.done = true;
     let Some(next) = next else { return };
+    let mut period = limits.period;
     if head.end == End::Tangent {
-        next.period = limits.period - ending.time;
+        period -= ending.time;
         next.speed = ending.speed;
     }
-    step(next, &Bounds::of(next, after, limits), limits);
+    step(next, &Bounds::of(next, after, limits), limits, period);
 }
 
 /// Begins the next segment while this one brakes.
@@ -341,7 +387,7 @@ fn parabola(head: &mut Segment, next: &mut Segment, limits: &Limits) {
         head.handing_over = head.speed < begins;
     }
     if head.handing_over {
-        step(next, &Bounds::of(next, None, limits), limits);
+        step(next, &Bounds::of(next, None, limits), limits, limits.period);
     }
 }
 

@@ -119,7 +119,7 @@ mod tests {
             let (mut at_once, mut one_by_one) = (full(), full());
             at_once.drain();
             while !one_by_one.queue.is_empty() {
-                one_by_one.cycle(1);
+                one_by_one.cycle();
             }
             let [a, b] = [at_once, one_by_one].map(|c| (c.cycles.cutting, c.cycles.rapid));
             // A segment that ends with its cycle may be rounded to end with the next.

@@ -29,17 +29,13 @@ impl Controller {
         }
         self.queue.push_back(next);
         brake_backward(&mut self.queue, &self.limits);
-        self.cycle(1);
-        while self.queue.len() > self.limits.depth + 4 {
-            self.cycle(u64::MAX);
-        }
+        self.cycle();
+        self.run(self.limits.depth + 4);
     }
 
     /// Runs until the queue is empty.
     pub(super) fn drain(&mut self) {
-        while !self.queue.is_empty() {
-            self.cycle(u64::MAX);
-        }
+        self.run(0);
     }
 }
 

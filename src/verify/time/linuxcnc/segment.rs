@@ -90,8 +90,6 @@ pub(super) struct Segment {
     pub ramp: bool,
     /// It ends within the next cycle, after this part of it and at this speed.
     pub ending: Option<Ending>,
-    /// Time of its next step: what a segment before it left of the cycle.
-    pub period: f64,
     pub done: bool,
     pub braking: bool,
     pub handing_over: bool,
