@@ -15,6 +15,9 @@ const CLEAR: f64 = 1.0 - 1e-9;
 /// And what is this part of it is above it.
 const OVER: f64 = 1.0 + 1e-9;
 
+/// Cycles of speeding up that are asked about together.
+const AT_ONCE: u32 = 4;
+
 impl Controller {
     /// One cycle of the servo loop.
     pub(super) fn cycle(&mut self) {
@@ -156,21 +159,33 @@ fn speed_up(head: &mut Segment, bounds: &Bounds, limits: &Limits, most: u32) -> 
     let &Bounds { end, along, .. } = bounds;
     let asked = bounds.asked * CLEAR;
     let gain = along * limits.period;
+    let clear = |before: f64, speed: f64, at: f64, progress: f64| {
+        let root = end * end + along * (2.0 * (head.length - at) - before * limits.period);
+        speed < asked
+            && speed * (speed + gain) < root * CLEAR
+            && far_from_end(head.length - progress, speed, end, gain, limits)
+    };
+    let (mut speed, mut progress) = (head.speed, head.progress);
     let mut cycles = 0;
-    while cycles < most {
-        let speed = head.speed + gain;
-        let root = end * end + along * (2.0 * head.left() - head.speed * limits.period);
-        let needed = speed * (speed + gain);
-        if speed >= asked || needed >= root * CLEAR {
-            break;
+    // The last of some cycles is the nearest to all limits.
+    for at_once in [AT_ONCE, 1] {
+        while most - cycles >= at_once {
+            let (mut faster, mut farther) = (speed, progress);
+            let (mut before, mut at) = (speed, progress);
+            for _ in 0..at_once {
+                (before, at) = (faster, farther);
+                faster += gain;
+                farther += 0.5 * (faster + before) * limits.period;
+            }
+            if !clear(before, faster, at, farther) {
+                break;
+            }
+            (speed, progress) = (faster, farther);
+            cycles += at_once;
         }
-        let progress = head.progress + 0.5 * (speed + head.speed) * limits.period;
-        if far_from_end(head.length - progress, speed, end, gain, limits) {
-            (head.speed, head.progress, head.braking) = (speed, progress, false);
-            cycles += 1;
-        } else {
-            break;
-        }
+    }
+    if cycles > 0 {
+        (head.speed, head.progress, head.braking) = (speed, progress, false);
     }
     cycles
 }
