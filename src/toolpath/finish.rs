@@ -191,16 +191,21 @@ fn passes(
         let Range { end, .. } = band_at(first);
         let cut = || -> Result<(), Error> {
             let ground = strip.as_ref().map(|strip| Ground::new(strip, &cutter));
+            let kept = |(rest, stay_mm): (&Rest, f64)| -> Vec<Vec<bool>> {
+                (first..end).into_par_iter().map(|k| rest.kept(&common, k, stay_mm)).collect()
+            };
+            let kept = rest.map(kept);
             let envelopes = match &ground {
                 Some(ground) => cutter.envelopes(ground.strip, &ground.wide, &layout, first..end),
-                None => slant::envelopes(site, &params.shape, &cutter, &common, first..end)?,
+                None => slant::envelopes(site, &params.shape, &cutter, &common, first..end, kept.as_deref())?,
             };
             let planned: Vec<(Vec<Run>, Tilt)> = (first..end)
                 .into_par_iter()
                 .zip(envelopes)
                 .map(|(k, mut envelope)| {
-                    if let Some((rest, stay_mm)) = rest {
-                        rest.thin(&common, k, stay_mm, &mut envelope.cl_mm);
+                    if let Some(kept) = &kept {
+                        let places = envelope.cl_mm.iter_mut().zip(&kept[k - first]);
+                        places.filter(|(_, kept)| !**kept).for_each(|(cl_mm, _)| *cl_mm = f32::NAN);
                     }
                     let layouts = [&layout, &common];
                     let (mut runs, tilt) = pass(site, params, layouts, k, stepover_mm, &envelope);

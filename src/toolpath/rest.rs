@@ -79,23 +79,22 @@ impl Rest {
         after > 0 && place_mm[0] <= stretches[after - 1][1] + SAME_MM
     }
 
-    /// Takes those cutter locations out of a pass that need not be cut: all that are not near, but for gaps of up to
-    /// `stay_mm`, over which the cutter stays down.
-    pub(super) fn thin(&self, layout: &Layout, pass: usize, stay_mm: f64, cl_mm: &mut [f32]) {
+    /// Which positions of a pass are cut: those that are near, and gaps of up to `stay_mm` between them, over which the
+    /// cutter stays down.
+    pub(super) fn kept(&self, layout: &Layout, pass: usize, stay_mm: f64) -> Vec<bool> {
         let stay = (stay_mm / layout.length_mm()) as usize;
-        let mut kept: Option<usize> = None;
-        for i in 0..cl_mm.len() {
+        let mut kept = vec![false; layout.count];
+        let mut last: Option<usize> = None;
+        for i in 0..layout.count {
             if !self.near(layout.place_mm(pass, i)) {
                 continue;
             }
             // What lies between this and the last one that is kept.
-            let from = kept.map_or(0, |last| last + 1);
-            if kept.is_none() || i - from > stay {
-                cl_mm[from..i].fill(f32::NAN);
-            }
-            kept = Some(i);
+            let from = last.map_or(i, |last| last + 1);
+            kept[if i - from > stay { i } else { from }..=i].fill(true);
+            last = Some(i);
         }
-        cl_mm[kept.map_or(0, |last| last + 1)..].fill(f32::NAN);
+        kept
     }
 }
 

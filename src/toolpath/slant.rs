@@ -84,13 +84,15 @@ pub(super) fn band_length(layout: &Layout, first: usize) -> usize {
     BAND.min(layout.passes.len() - first)
 }
 
-/// The bounds of some passes on the coarsest grid of the job, block by block along them.
+/// The bounds of some passes on the coarsest grid of the job, block by block along them; where only some positions are
+/// kept, of these only.
 pub(super) fn envelopes(
     site: &Site,
     shape: &Shape,
     cutter: &Cutter,
     layout: &Layout,
     passes: Range<usize>,
+    kept: Option<&[Vec<bool>]>,
 ) -> Result<Vec<Envelope>, Error> {
     let track = tracks(shape, layout);
     let nothing = || Envelope {
@@ -103,6 +105,9 @@ pub(super) fn envelopes(
     let end = layout.count.saturating_sub(1);
     for from in (0..end).step_by(BLOCK) {
         let to = (from + BLOCK).min(end);
+        if kept.is_some_and(|kept| kept.iter().all(|kept| !kept[from..=to].contains(&true))) {
+            continue;
+        }
         let Some((low_mm, high_mm)) = layout.surroundings(&passes, from, to) else { continue };
         let reach_mm = cutter.reach_mm + beside_mm;
         let strip = Strip::around(
@@ -121,7 +126,7 @@ pub(super) fn envelopes(
             missed_mm: strip.missed_mm,
         };
         out.par_iter_mut().zip(passes.clone()).for_each(|(envelope, k)| {
-            block.bound(k, from, to, envelope);
+            block.bound(k, from, to, kept.map(|kept| &kept[k - passes.start][..]), envelope);
         });
     }
     Ok(out)
@@ -139,10 +144,14 @@ struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// Raises an envelope over the positions `from ..= to` of pass `k`.
-    fn bound(&self, k: usize, from: usize, to: usize, envelope: &mut Envelope) {
+    /// Raises an envelope over the positions `from ..= to` of pass `k`, as far as they are kept.
+    fn bound(&self, k: usize, from: usize, to: usize, kept: Option<&[bool]>, envelope: &mut Envelope) {
         let mut near = None;
-        for i in (from..=to).filter(|&i| self.layout.covers(k, i)) {
+        // The intervals on both sides of a position bound it.
+        let needed = |i: usize| {
+            kept.is_none_or(|kept| kept[i.saturating_sub(1)..(i + 2).min(kept.len())].contains(&true))
+        };
+        for i in (from..=to).filter(|&i| self.layout.covers(k, i) && needed(i)) {
             let [along, across] = self.layout.turned_mm(k, i);
             let mut drop_mm = |place: [f64; 2]| {
                 let sampled = self.places.drop_mm(self.cutter.exact.profile(), place, &mut near);
