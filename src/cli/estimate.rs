@@ -6,7 +6,7 @@ use screenmill::job::Job;
 use screenmill::machine::Machine;
 use screenmill::pipeline;
 use screenmill::verify::{
-    Clock, Event, Extent, Kinematics, Language, Options, Summary, Timing, Travel, TravelSearch,
+    Clock, Command, Event, Extent, Kinematics, Language, Options, Summary, Timing, Travel, TravelSearch,
 };
 use serde_json::{Map, Value, json};
 
@@ -159,15 +159,19 @@ fn job(path: &Path, common: &Common) -> Result<Outcome, Refusal> {
 
 fn estimate(path: &Path, options: &Options, kinematics: &Kinematics) -> Result<Estimated, Refused> {
     let travel = travel(path, options)?;
-    let mut timer = Clock::new(kinematics, travel);
+    let Clock { mut interpreter, mut planner } = Clock::new(kinematics, travel);
     let mut extent = Extent::with_travel(travel);
-    let mut reach = |event: &Event| {
+    // All that needs no planning is done beside the reading.
+    let mut interpret = |event: &Event, commands: &mut Vec<Command>| {
         if let Event::Move(motion) = event {
             extent.add(motion);
         }
+        interpreter.event(event, &mut |command| commands.push(command));
     };
-    let summary = stream(path, options, &mut reach, &mut |event| timer.event(event))?;
-    let timing = timer.finish(summary.bytes);
+    let summary = stream(path, options, &mut interpret, &mut |commands: &[Command]| {
+        commands.iter().for_each(|command| planner.take(command));
+    })?;
+    let timing = Clock { interpreter, planner }.finish(summary.bytes);
     let notes = summary.notes.iter().map(ToString::to_string).collect();
     Ok(Estimated { summary, extent, timing, notes, errors: Vec::new() })
 }
@@ -178,7 +182,7 @@ fn travel(path: &Path, options: &Options) -> Result<Travel, Refused> {
         return Ok(Travel::default());
     }
     let mut search = TravelSearch::default();
-    let mut look = |event: &Event| {
+    let mut look = |event: &Event, _: &mut Vec<()>| {
         if let Event::Move(motion) = event {
             search.add(motion);
         }

@@ -14,7 +14,7 @@ use super::Refusal;
 
 /// Bytes read ahead: long enough for a header, so that the language is found.
 const BUFFER: usize = 1 << 16;
-/// Events handed from the reading thread at once, and how many such batches may wait.
+/// What the reading thread hands over at once, and how many such batches may wait.
 const BATCH: usize = 2048;
 const BATCHES: usize = 4;
 
@@ -78,41 +78,43 @@ pub fn read(path: &Path, options: &Options) -> Result<Reading, Refused> {
 }
 
 /// Reads a program event by event; a text without a motion is refused. The text is taken apart on a
-/// thread of its own, where `beside` gets every event first.
-pub fn stream(
+/// thread of its own, where `beside` gets every event and says what of it goes on, batch by batch.
+pub fn stream<T: Send>(
     path: &Path,
     options: &Options,
-    beside: &mut (dyn FnMut(&Event) + Send),
-    each: &mut dyn FnMut(&Event),
+    beside: &mut (dyn FnMut(&Event, &mut Vec<T>) + Send),
+    onward: &mut dyn FnMut(&[T]),
 ) -> Result<Summary, Refused> {
     let refused = |source| Refused::Text { path: path.into(), source };
     let (mut file, options) = (open(path)?, *options);
-    let (sender, batches) = mpsc::sync_channel::<Vec<Event>>(BATCHES);
-    let mut moved = false;
-    let summary = std::thread::scope(|scope| {
+    let (sender, batches) = mpsc::sync_channel::<Vec<T>>(BATCHES);
+    let (back, empty) = mpsc::channel::<Vec<T>>();
+    let (summary, moved) = std::thread::scope(|scope| {
         let reader = scope.spawn(move || {
+            let mut moved = false;
             let mut batch = Vec::with_capacity(BATCH);
             let summary = verify::read(&mut file, &options, &mut |event| {
-                beside(event);
-                batch.push(*event);
-                if batch.len() == BATCH {
+                moved |= matches!(event, Event::Move(_));
+                beside(event, &mut batch);
+                if batch.len() >= BATCH {
+                    let next = empty.try_recv().unwrap_or_else(|_| Vec::with_capacity(BATCH));
                     // The other end takes everything until this one is done.
-                    let _ = sender.send(std::mem::replace(&mut batch, Vec::with_capacity(BATCH)));
+                    let _ = sender.send(std::mem::replace(&mut batch, next));
                 }
                 Ok(())
             });
             let _ = sender.send(batch);
-            summary
+            (summary, moved)
         });
-        for batch in batches {
-            for event in &batch {
-                moved |= matches!(event, Event::Move(_));
-                each(event);
-            }
+        for mut batch in batches {
+            onward(&batch);
+            batch.clear();
+            // Where the reader is done, none is needed.
+            let _ = back.send(batch);
         }
         reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-    })
-    .map_err(refused)?;
+    });
+    let summary = summary.map_err(refused)?;
     if moved { Ok(summary) } else { Err(refused(verify::Error::Empty)) }
 }
 

@@ -26,5 +26,5 @@ pub use reading::{
 };
 pub use sweep::{Bite, ProgramCut, Swept, sweep};
 pub use text::{language, read};
-pub use time::{Clock, Corner, Kinematics, Timing, time};
+pub use time::{Clock, Command, Corner, Interpreter, Kinematics, Planner, Timing, time};
 pub use travel::{Travel, TravelSearch};

@@ -14,23 +14,65 @@ const SHORTEST_ARC: f64 = 1e-6;
 /// Directions within this count as one line.
 const SAME_DIRECTION: f64 = 1e-3;
 
+/// What of a segment its kinks depend on.
+#[derive(Clone, Copy)]
+pub(super) struct Side {
+    /// Unit tangents at start and end.
+    pub first: DVec3,
+    pub last: DVec3,
+    pub speed_asked: f64,
+    pub acceleration: f64,
+    pub arc: bool,
+    pub end: End,
+}
+
+/// How two segments meet, as far as it does not matter what runs meanwhile.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in super::super) struct Kink {
+    /// It nearly turns back.
+    reversal: bool,
+    /// The slower of the speeds asked for.
+    speed: f64,
+    /// Share of the acceleration that it asks of the axes.
+    asks: f64,
+    /// Where it may be rounded.
+    corner: Corner,
+}
+
+impl Kink {
+    pub(super) fn between(limits: &Limits, before: &Side, next: &Side) -> Kink {
+        let (u1, u2) = (before.last, next.first);
+        if (u1 + u2).length_squared() < SHARP * SHARP {
+            return Kink { reversal: true, ..Kink::default() };
+        }
+        // What the kink asks of the axes, at the speed of the slower, within one period of the servo loop.
+        let speed = lesser(before.speed_asked, next.speed_asked);
+        let jump = (u2 - u1).abs() * (speed / limits.period + next.acceleration) / limits.acceleration;
+        let mut asks = greatest(jump);
+        if before.arc || next.arc {
+            asks /= TANGENTIAL;
+        }
+        let rounded = before.end == End::Parabola && asks >= KINK_RATIO;
+        let corner = if rounded { Corner::between(limits, u1, u2) } else { Corner::default() };
+        Kink { reversal: false, speed, asks, corner }
+    }
+}
+
 /// Joins a new segment to the last of the queue (tp.c: tpHandleBlendArc); gives the arc that comes between them, if any does.
-pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) -> Option<RoundedCorner> {
+pub(super) fn join(
+    limits: &Limits,
+    before: &mut Segment,
+    next: &mut Segment,
+    kink: &Kink,
+) -> Option<RoundedCorner> {
     if before.progress > 0.5 * before.length || before.end == End::Stop {
         return None;
     }
-    let (u1, u2) = (before.last, next.first);
-    if (u1 + u2).length_squared() < SHARP * SHARP {
+    if kink.reversal {
         before.end_with(End::Stop, next);
         return None;
     }
-    // What the kink asks of the axes, at the speed of the slower, within one period of the servo loop.
-    let speed = lesser(before.speed_asked(), next.speed_asked());
-    let jump = (u2 - u1).abs() * (speed / limits.period + next.acceleration) / limits.acceleration;
-    let mut asks = greatest(jump);
-    if before.shape == Shape::Arc || next.shape == Shape::Arc {
-        asks /= TANGENTIAL;
-    }
+    let &Kink { speed, asks, ref corner, .. } = kink;
     let share = lesser(asks, KINK_RATIO);
     before.kink_after = greater(before.kink_after, share);
     next.kink_before = greater(next.kink_before, share);
@@ -44,14 +86,13 @@ pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) ->
         return None;
     }
     let straight_on = speed * KINK_RATIO / asks;
-    let corner = Corner::between(u1, u2);
-    if let Some(arc) = RoundedCorner::fit(limits, before, next, &corner) {
+    if let Some(arc) = RoundedCorner::fit(limits, before, next, corner) {
         let fastest = arc.fastest(limits, before);
         // What a parabola could reach at most settles most corners.
         let cut = 2.0 * before.acceleration * before.tolerance;
         let most2 = if before.tolerance > 0.0 { cut / corner.cos_theta } else { f64::INFINITY };
         let clear = 4.0 * fastest * fastest > most2;
-        if fastest > straight_on && (clear || fastest > 0.5 * parabola_speed(limits, before, next, &corner)) {
+        if fastest > straight_on && (clear || fastest > 0.5 * parabola_speed(limits, before, next, corner)) {
             forget_kink(before, next);
             next.length -= arc.reach;
             if arc.keeps {
@@ -62,7 +103,7 @@ pub(super) fn join(limits: &Limits, before: &mut Segment, next: &mut Segment) ->
             return Some(arc);
         }
     }
-    let parabola = 0.5 * parabola_speed(limits, before, next, &corner);
+    let parabola = 0.5 * parabola_speed(limits, before, next, corner);
     if straight_on > parabola {
         before.end_with(End::Tangent, next);
     } else {
@@ -79,25 +120,38 @@ fn forget_kink(before: &mut Segment, next: &mut Segment) {
 }
 
 /// The corner between two unit vectors. With phi the turn, theta = (pi - phi) / 2.
+#[derive(Clone, Copy, Debug, Default)]
 struct Corner {
     turn: f64,
     sin_theta: f64,
     cos_theta: f64,
-    across: DVec3,
+    /// What the axes allow in any direction of its plane.
+    acceleration: f64,
+    speed: f64,
 }
 
 impl Corner {
-    fn between(u1: DVec3, u2: DVec3) -> Corner {
-        // |u2 - u1| = 2 sin(phi / 2), which keeps its digits at small turns.
-        let cos_theta = lesser(0.5 * (u2 - u1).length(), 1.0);
-        let sin_theta = lesser(0.5 * (u2 + u1).length(), 1.0);
+    fn between(limits: &Limits, u1: DVec3, u2: DVec3) -> Corner {
+        let cos_theta = half_jump(u1, u2);
+        let across = across(u1, u2);
         Corner {
             turn: 2.0 * cos_theta.asin(),
-            sin_theta,
+            sin_theta: lesser(0.5 * (u2 + u1).length(), 1.0),
             cos_theta,
-            across: u1.cross(u2).normalize_or_zero(),
+            acceleration: in_plane(across, limits.acceleration),
+            speed: in_plane(across, limits.speed),
         }
     }
+}
+
+/// Axis of the turn.
+fn across(u1: DVec3, u2: DVec3) -> DVec3 {
+    u1.cross(u2).normalize_or_zero()
+}
+
+/// |u2 - u1| / 2 = sin(phi / 2), which keeps its digits at small turns.
+fn half_jump(u1: DVec3, u2: DVec3) -> f64 {
+    lesser(0.5 * (u2 - u1).length(), 1.0)
 }
 
 /// Speed across a parabolic blend, as far as it goes along the turn (tp.c: tpComputeBlendVelocity).
@@ -105,7 +159,7 @@ fn parabola_speed(limits: &Limits, before: &Segment, next: &Segment, corner: &Co
     let [this, after] = parabola_speeds(
         before,
         next,
-        corner,
+        corner.cos_theta,
         lesser(before.speed_asked(), limits.path_speed),
         lesser(next.speed_asked(), limits.path_speed),
     );
@@ -113,7 +167,7 @@ fn parabola_speed(limits: &Limits, before: &Segment, next: &Segment, corner: &Co
 }
 
 /// Speeds of the two segments at which a parabolic blend between them begins.
-fn parabola_speeds(before: &Segment, next: &Segment, corner: &Corner, this: f64, after: f64) -> [f64; 2] {
+fn parabola_speeds(before: &Segment, next: &Segment, cos_theta: f64, this: f64, after: f64) -> [f64; 2] {
     let (a1, a2) = (before.acceleration_along(), next.acceleration_along());
     let reach = |segment: &Segment, a: f64| {
         (a * if segment.settled { segment.length } else { 0.5 * segment.length }).sqrt()
@@ -122,8 +176,8 @@ fn parabola_speeds(before: &Segment, next: &Segment, corner: &Corner, this: f64,
     let longest = lesser(before.length / v1, next.length / v2);
     let time = lesser(longest, greater(v1 / a1, v2 / a2));
     let mut speeds = [lesser(v1, time * a1), lesser(v2, time * a2)];
-    if before.tolerance > 0.0 && corner.cos_theta > 1e-3 {
-        let cut = 2.0 * (a1 * before.tolerance / corner.cos_theta).sqrt();
+    if before.tolerance > 0.0 && cos_theta > 1e-3 {
+        let cut = 2.0 * (a1 * before.tolerance / cos_theta).sqrt();
         speeds = speeds.map(|v| lesser(v, cut));
     }
     speeds
@@ -131,7 +185,7 @@ fn parabola_speeds(before: &Segment, next: &Segment, corner: &Corner, this: f64,
 
 /// The speed of `before` below which a parabola takes over, with the speeds asked for now.
 pub(super) fn parabola_begins(before: &Segment, next: &Segment, this: f64, after: f64) -> f64 {
-    parabola_speeds(before, next, &Corner::between(before.last, next.first), this, after)[0]
+    parabola_speeds(before, next, half_jump(before.last, next.first), this, after)[0]
 }
 
 /// An arc that rounds a corner (blendmath.c: blendComputeParameters).
@@ -149,7 +203,7 @@ pub(super) struct RoundedCorner {
 
 impl RoundedCorner {
     fn fit(limits: &Limits, before: &Segment, next: &Segment, corner: &Corner) -> Option<RoundedCorner> {
-        let Corner { mut turn, mut sin_theta, mut cos_theta, across } = *corner;
+        let Corner { mut turn, mut sin_theta, mut cos_theta, acceleration, speed: plane } = *corner;
         if 0.5 * turn < SMALLEST_ANGLE || sin_theta < SMALLEST_ANGLE {
             return None;
         }
@@ -157,6 +211,7 @@ impl RoundedCorner {
         let mut less = 0.0;
         let mut side = |segment: &Segment, at: usize, share: f64, length: f64, towards: f64, other: DVec3| {
             let Some(circle) = &segment.circle else { return Some(length) };
+            let across = across(before.last, next.first);
             if across.cross(circle.normal).length() > SAME_DIRECTION {
                 return None;
             }
@@ -181,10 +236,8 @@ impl RoundedCorner {
             if segment.tolerance == 0.0 { quarter } else { lesser(segment.tolerance, quarter) }
         };
         let tolerance = lesser(tolerance(before), tolerance(next));
-        let acceleration = in_plane(across, limits.acceleration);
         let normal = NORMAL * acceleration;
         let asked = greater(before.speed_asked(), next.speed_asked());
-        let plane = in_plane(across, limits.speed);
         let goal = if asked <= plane { asked } else { asked.min(plane.max(altitude(before, next, turn))) };
 
         let tan_theta = sin_theta / cos_theta;

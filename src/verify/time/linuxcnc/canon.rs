@@ -1,10 +1,9 @@
-use std::collections::VecDeque;
-
 use glam::DVec3;
 
 use super::super::round::Round;
-use super::segment::{Circle, End, NORMAL, Segment, Shape, TANGENTIAL};
-use super::{Controller, Cycles, Limits, SAME_PLACE, greatest, lesser};
+use super::blend::{Kink, Side};
+use super::segment::{Circle, End, Line, NORMAL, Segment, Shape};
+use super::{Command, Limits, Motion, SAME_PLACE, greatest, lesser};
 use crate::verify::reading::PathMode;
 
 /// Longest chain of blocks that are merged.
@@ -12,31 +11,35 @@ const LONGEST_CHAIN: usize = 100;
 /// Less is no way for an axis (CART_FUZZ).
 const NO_WAY: f64 = 1e-8;
 
+/// Makes the controller's commands of the motions of a program, one by one.
+pub(in super::super) struct Canon {
+    limits: Limits,
+    end: End,
+    tolerance: f64,
+    merge: f64,
+    chain: Chain,
+    /// What came last.
+    last: Option<Side>,
+}
+
 /// Feed blocks that may still become one line (emccanon.cc: see_segment).
 #[derive(Debug, Default)]
-pub(super) struct Chain {
+struct Chain {
     /// Where the controller's last command ended.
     from: DVec3,
     points: Vec<DVec3>,
     feed: f64,
 }
 
-impl Controller {
-    pub fn new(limits: Limits, at: DVec3, tolerance: f64) -> Controller {
-        Controller {
-            limits,
-            end: End::Parabola,
-            tolerance,
-            merge: 0.0,
-            chain: Chain { from: at, ..Chain::default() },
-            queue: VecDeque::with_capacity(limits.depth + 8),
-            cycles: Cycles::default(),
-        }
+impl Canon {
+    pub fn new(limits: Limits, at: DVec3, tolerance: f64) -> Canon {
+        let chain = Chain { from: at, ..Chain::default() };
+        Canon { limits, end: End::Parabola, tolerance, merge: 0.0, chain, last: None }
     }
 
     /// G61, G61.1 or G64; a G64 without Q merges within P.
-    pub fn path(&mut self, mode: PathMode) {
-        self.flush();
+    pub fn path(&mut self, mode: PathMode, give: &mut impl FnMut(Command)) {
+        self.flush(give);
         (self.end, self.tolerance, self.merge) = match mode {
             PathMode::Stop => (End::Stop, 0.0, self.merge),
             PathMode::Exact => (End::Exact, 0.0, self.merge),
@@ -47,32 +50,32 @@ impl Controller {
         };
     }
 
-    pub fn rapid(&mut self, to: DVec3) {
-        self.flush();
+    pub fn rapid(&mut self, to: DVec3, give: &mut impl FnMut(Command)) {
+        self.flush(give);
         let speed = self.limits.speed;
-        self.line(to, f64::INFINITY, speed, true);
+        self.line(to, f64::INFINITY, speed, true, give);
     }
 
     /// `feed` in mm/s.
-    pub fn feed(&mut self, to: DVec3, feed: f64) {
+    pub fn feed(&mut self, to: DVec3, feed: f64, give: &mut impl FnMut(Command)) {
         if feed != self.chain.feed {
-            self.flush();
+            self.flush(give);
             self.chain.feed = feed;
         }
         if !self.chain.points.is_empty() && !self.merges(to) {
-            self.flush();
+            self.flush(give);
         }
         self.chain.points.push(to);
     }
 
-    pub fn arc(&mut self, arc: &Round, feed: f64) {
+    pub fn arc(&mut self, arc: &Round, feed: f64, give: &mut impl FnMut(Command)) {
         let blends = self.end == End::Parabola;
         if blends && arc.normal.z.abs() > 0.5 && arc.radius * (1.0 - (0.5 * arc.angle).cos()) < self.merge {
-            self.feed(arc.middle, feed);
-            self.feed(arc.to, feed);
+            self.feed(arc.middle, feed, give);
+            self.feed(arc.to, feed, give);
             return;
         }
-        self.flush();
+        self.flush(give);
         self.chain.feed = feed;
         let axis = arc.normal.abs().to_array();
         let upright = (0..3).max_by(|a, b| axis[*a].total_cmp(&axis[*b])).unwrap_or(2);
@@ -97,20 +100,33 @@ impl Controller {
             climb: arc.climb,
         };
         let speed = arc.length / time;
-        let segment = self.segment(Shape::Arc, arc.length, [arc.first, arc.last], false);
-        self.push(Segment {
+        let line = Line {
+            unit: arc.first,
+            length: arc.length,
             requested: feed.min(speed),
             speed_max: speed.min(arc.length / self.limits.period),
             acceleration: arc.length / slow,
-            circle: Some(Box::new(circle)),
-            ..segment
+            end: self.end,
+            tolerance: self.tolerance,
+            rapid: false,
+        };
+        let segment =
+            Segment { shape: Shape::Arc, last: arc.last, circle: Some(Box::new(circle)), ..line.segment() };
+        let kink = self.kink(Side {
+            first: arc.first,
+            last: arc.last,
+            speed_asked: segment.speed_asked(),
+            acceleration: segment.acceleration,
+            arc: true,
+            end: self.end,
         });
+        give(Command { motion: Motion::Arc(Box::new(segment)), kink });
     }
 
-    /// Comes to rest: what is merged so far runs, then everything in the queue.
-    pub fn stop(&mut self) {
-        self.flush();
-        self.drain();
+    /// How the last segment meets the next.
+    fn kink(&mut self, next: Side) -> Kink {
+        let before = self.last.replace(next);
+        before.map_or(Kink::default(), |before| Kink::between(&self.limits, &before, &next))
     }
 
     /// Whether all blocks of the chain stay near the line from its start to `to`.
@@ -129,15 +145,16 @@ impl Controller {
         })
     }
 
-    fn flush(&mut self) {
+    /// What is merged so far runs.
+    pub fn flush(&mut self, give: &mut impl FnMut(Command)) {
         if let Some(to) = self.chain.points.last().copied() {
             self.chain.points.clear();
             let feed = self.limits.feed;
-            self.line(to, self.chain.feed, feed, false);
+            self.line(to, self.chain.feed, feed, false, give);
         }
     }
 
-    fn line(&mut self, to: DVec3, asked: f64, speeds: DVec3, rapid: bool) {
+    fn line(&mut self, to: DVec3, asked: f64, speeds: DVec3, rapid: bool, give: &mut impl FnMut(Command)) {
         let way = to - self.chain.from;
         let (time, slow) = (longest(way, speeds), longest(way, self.limits.acceleration));
         self.chain.from = to;
@@ -147,48 +164,25 @@ impl Controller {
         }
         let speed = length / time;
         let unit = way / length;
-        let segment = self.segment(Shape::Line, length, [unit, unit], rapid);
-        self.push(Segment {
+        let line = Line {
+            unit,
+            length,
             requested: lesser(asked, speed),
             speed_max: lesser(speed, length / self.limits.period),
             acceleration: length / slow,
-            ..segment
-        });
-    }
-
-    fn segment(&self, shape: Shape, length: f64, tangents: [DVec3; 2], rapid: bool) -> Segment {
-        Segment {
-            shape,
-            circle: None,
-            rapid,
             end: self.end,
-            parabola_before: false,
-            length,
-            nominal_length: length,
-            first: tangents[0],
-            last: tangents[1],
-            requested: 0.0,
-            speed_max: 0.0,
-            acceleration: 0.0,
-            tangential: TANGENTIAL,
-            kink_speed: None,
-            kink_before: 0.0,
-            kink_after: 0.0,
             tolerance: self.tolerance,
-            settled: false,
-            gain2: 0.0,
-            spread_speed: 0.0,
-            end_speed: 0.0,
-            at_peak: false,
-            active: false,
-            progress: 0.0,
-            speed: 0.0,
-            ramp: false,
-            ending: None,
-            done: false,
-            braking: false,
-            handing_over: false,
-        }
+            rapid,
+        };
+        let kink = self.kink(Side {
+            first: unit,
+            last: unit,
+            speed_asked: lesser(line.requested, line.speed_max),
+            acceleration: line.acceleration,
+            arc: false,
+            end: self.end,
+        });
+        give(Command { motion: Motion::Line(line), kink });
     }
 }
 

@@ -14,7 +14,9 @@ use std::collections::VecDeque;
 
 use glam::DVec3;
 
-use segment::{End, Segment};
+use blend::Kink;
+pub(super) use canon::Canon;
+use segment::{Line, Segment};
 
 /// Shorter is no way at all (TP_POS_EPSILON).
 const SAME_PLACE: f64 = 1e-12;
@@ -61,13 +63,20 @@ pub(super) struct Cycles {
     pub rapid: u64,
 }
 
+/// What comes to the controller: a segment, and how it meets the one before.
+pub(super) struct Command {
+    motion: Motion,
+    kink: Kink,
+}
+
+enum Motion {
+    Line(Line),
+    Arc(Box<Segment>),
+}
+
 /// The controller while a program runs.
 pub(super) struct Controller {
     limits: Limits,
-    end: End,
-    tolerance: f64,
-    merge: f64,
-    chain: canon::Chain,
     queue: VecDeque<Segment>,
     pub cycles: Cycles,
 }
@@ -104,16 +113,18 @@ mod tests {
             ],
         ) {
             let full = || {
-                let mut controller = Controller::new(LIMITS, DVec3::ZERO, 0.0);
-                controller.path(mode);
+                let mut controller = Controller::new(LIMITS);
+                let mut canon = Canon::new(LIMITS, DVec3::ZERO, 0.0);
+                let give = &mut |command: Command| controller.take(&command);
+                canon.path(mode, give);
                 let mut at = DVec3::ZERO;
                 for &(x, y, z) in &ways {
                     at += scale * DVec3::new(x, y, z);
-                    controller.feed(at, feed);
+                    canon.feed(at, feed, give);
                 }
                 // Two more come than the chain holds back.
-                controller.feed(at + DVec3::X, feed);
-                controller.rapid(DVec3::ZERO);
+                canon.feed(at + DVec3::X, feed, give);
+                canon.rapid(DVec3::ZERO, give);
                 controller
             };
             let (mut at_once, mut one_by_one) = (full(), full());

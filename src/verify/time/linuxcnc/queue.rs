@@ -1,22 +1,34 @@
 use std::collections::VecDeque;
 
-use super::blend::join;
+use super::blend::{Kink, join};
 use super::segment::{End, Segment};
-use super::{Controller, Limits, lesser};
+use super::{Command, Controller, Cycles, Limits, Motion, lesser};
 
 /// The backward pass ends after more peaks than this (TP_OPTIMIZATION_CUTOFF).
 const PEAKS: u32 = 4;
 
 impl Controller {
+    pub fn new(limits: Limits) -> Controller {
+        Controller { limits, queue: VecDeque::with_capacity(limits.depth + 8), cycles: Cycles::default() }
+    }
+
+    pub fn take(&mut self, command: &Command) {
+        let segment = match &command.motion {
+            Motion::Line(line) => line.segment(),
+            Motion::Arc(segment) => Segment::clone(segment),
+        };
+        self.push(segment, &command.kink);
+    }
+
     /// Takes a segment in, and runs the servo cycles that pass meanwhile: the controller takes one
     /// command a cycle. Once the queue is longer than the backward pass, when more come changes
     /// nothing any more.
-    pub(super) fn push(&mut self, mut next: Segment) {
+    fn push(&mut self, mut next: Segment, kink: &Kink) {
         if let Some(before) = self.queue.back_mut() {
             if before.rapid != next.rapid {
                 before.end_with(End::Stop, &mut next);
             }
-            match join(&self.limits, before, &mut next) {
+            match join(&self.limits, before, &mut next, kink) {
                 Some(arc) if arc.keeps => {
                     before.settle(self.limits.period);
                     let blend = arc.segment(&self.limits, before);
@@ -34,7 +46,7 @@ impl Controller {
     }
 
     /// Runs until the queue is empty.
-    pub(super) fn drain(&mut self) {
+    pub fn drain(&mut self) {
         self.run(0);
     }
 }

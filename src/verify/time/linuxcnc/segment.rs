@@ -45,8 +45,58 @@ pub(super) struct Circle {
     pub climb: f64,
 }
 
-/// One segment of the controller's queue. Lengths in mm, speeds in mm/s.
+/// A straight segment as it comes to the controller. Lengths in mm, speeds in mm/s.
 #[derive(Debug)]
+pub(in super::super) struct Line {
+    pub unit: DVec3,
+    pub length: f64,
+    pub requested: f64,
+    pub speed_max: f64,
+    pub acceleration: f64,
+    pub(super) end: End,
+    pub tolerance: f64,
+    pub rapid: bool,
+}
+
+impl Line {
+    pub(super) fn segment(&self) -> Segment {
+        Segment {
+            shape: Shape::Line,
+            circle: None,
+            rapid: self.rapid,
+            end: self.end,
+            parabola_before: false,
+            length: self.length,
+            nominal_length: self.length,
+            first: self.unit,
+            last: self.unit,
+            requested: self.requested,
+            speed_max: self.speed_max,
+            acceleration: self.acceleration,
+            tangential: TANGENTIAL,
+            kink_speed: None,
+            kink_before: 0.0,
+            kink_after: 0.0,
+            tolerance: self.tolerance,
+            settled: false,
+            gain2: 0.0,
+            spread_speed: 0.0,
+            end_speed: 0.0,
+            at_peak: false,
+            active: false,
+            progress: 0.0,
+            speed: 0.0,
+            ramp: false,
+            ending: None,
+            done: false,
+            braking: false,
+            handing_over: false,
+        }
+    }
+}
+
+/// One segment of the controller's queue. Lengths in mm, speeds in mm/s.
+#[derive(Clone, Debug)]
 pub(super) struct Segment {
     pub shape: Shape,
     /// Of an arc of the program; few programs have them, so they stand apart.
