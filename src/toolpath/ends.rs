@@ -59,9 +59,7 @@ pub(super) fn lay(low: &[f64], high: &[f64], exact: &[f64], measure: &Measure) -
 
 /// The same where moves may end elsewhere than they may pass.
 pub(super) fn lay_between(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Vec<Vertex> {
-    let mut table = Table::new(bounds, exact, measure);
-    table.fill();
-    table.best(bounds.off)
+    Table::filled(bounds, exact, measure).best(bounds.off)
 }
 
 #[cfg(test)]

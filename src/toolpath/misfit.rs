@@ -26,6 +26,7 @@ pub(super) struct Sums {
 
 impl Sums {
     /// Of all positions, in groups of eight; exact heights in units.
+    #[inline(always)]
     pub(super) fn along(exact: &[f64], measure: &Measure) -> Vec<Sums> {
         let turned = (measure.unit_mm / measure.pitch_mm).powi(2);
         let raised = FLANKS * (measure.unit_mm / measure.stepover_mm).powi(2);

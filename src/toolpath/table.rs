@@ -57,7 +57,8 @@ pub(super) struct Table {
 
 impl Table {
     /// Bounds and exact heights in units; none of them empty.
-    pub(super) fn new(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Table {
+    #[inline(always)]
+    fn new(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Table {
         let Bounds { low, high, ends, off } = bounds;
         let count = low.len();
         let groups = count.div_ceil(EIGHT);
@@ -95,33 +96,40 @@ impl Table {
         table
     }
 
-    /// Finds the cheapest way to every point, with the widest vectors that this processor has; the answer is the
-    /// same for all.
-    pub(super) fn fill(&mut self) {
+    /// The table with the cheapest way to every point, found with the widest vectors that this processor has; the answer
+    /// is the same for all.
+    pub(super) fn filled(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Table {
         #[cfg(target_arch = "x86_64")]
         {
             use super::eight::Avx512;
             #[target_feature(enable = "avx512f,avx512vl,avx2")]
-            fn avx512(table: &mut Table) {
-                table.fill_with::<Avx512>();
+            fn avx512(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Table {
+                Table::filled_with::<Avx512>(bounds, exact, measure)
             }
             #[target_feature(enable = "avx2")]
-            fn avx2(table: &mut Table) {
-                table.fill_with::<Portable>();
+            fn avx2(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Table {
+                Table::filled_with::<Portable>(bounds, exact, measure)
             }
             if is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512vl")
                 && is_x86_feature_detected!("avx2")
             {
                 // SAFETY: the features were found on this processor.
-                return unsafe { avx512(self) };
+                return unsafe { avx512(bounds, exact, measure) };
             }
             if is_x86_feature_detected!("avx2") {
                 // SAFETY: the feature was found on this processor.
-                return unsafe { avx2(self) };
+                return unsafe { avx2(bounds, exact, measure) };
             }
         }
-        self.fill_with::<Portable>();
+        Table::filled_with::<Portable>(bounds, exact, measure)
+    }
+
+    #[inline(always)]
+    fn filled_with<E: Eight>(bounds: &Bounds, exact: &[f64], measure: &Measure) -> Table {
+        let mut table = Table::new(bounds, exact, measure);
+        table.fill_with::<E>();
+        table
     }
 
     #[inline(always)]
@@ -272,10 +280,8 @@ mod tests {
             let ends: Vec<[f64; 2]> = low.iter().zip(&high).map(|(low, high)| [*low, *high]).collect();
             let off = vec![[0.0; 2]; low.len()];
             let bounds = Bounds { low: &low, high: &high, ends: &ends, off: &off };
-            let mut widest = Table::new(&bounds, &exact, &MEASURE);
-            widest.fill();
-            let mut portable = Table::new(&bounds, &exact, &MEASURE);
-            portable.fill_with::<Portable>();
+            let widest = Table::filled(&bounds, &exact, &MEASURE);
+            let portable = Table::filled_with::<Portable>(&bounds, &exact, &MEASURE);
             for (a, b) in widest.points.iter().zip(&portable.points) {
                 prop_assert!(a.cost.iter().zip(&b.cost).all(|(a, b)| a.to_bits() == b.to_bits()));
             }
