@@ -96,7 +96,8 @@ impl Strip {
         }
         let around = (reach_mm / self.step_mm).ceil() as usize + 1;
         Ceiling {
-            z_mm: sliding(&z_mm, around, f32::max),
+            // None is NaN: a row without data raises nothing.
+            z_mm: sliding(&z_mm, around, |a, b| if b > a { b } else { a }),
             first: window.column,
             step_mm: self.step_mm,
             missed_mm: self.missed_mm,

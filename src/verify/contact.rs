@@ -18,6 +18,8 @@ pub(super) struct Lean {
 
 /// One cutter profile as the sweep needs it.
 pub(super) trait Contact: Copy + Sync {
+    /// Whether it cuts as deep as in the middle all over.
+    const FLAT: bool = false;
     /// Largest radius in mm.
     fn radius(&self) -> f64;
     fn lean(&self, m: f64) -> Lean;
@@ -78,6 +80,8 @@ pub(super) struct Flat {
 }
 
 impl Contact for Flat {
+    const FLAT: bool = true;
+
     fn radius(&self) -> f64 {
         self.radius
     }

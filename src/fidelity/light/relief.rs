@@ -116,6 +116,21 @@ impl<'a> Relief<'a> {
         self.patches[row / PATCH * self.across + column / PATCH].clear
     }
 
+    /// Shows the columns of a row, of those given, by runs of one [`Relief::clear`].
+    pub(super) fn each_clear(
+        &self,
+        row: usize,
+        columns: Range<usize>,
+        mut show: impl FnMut(Range<usize>, f64),
+    ) {
+        let mut start = columns.start;
+        while start < columns.end {
+            let end = ((start / PATCH + 1) * PATCH).min(columns.end);
+            show(start..end, self.clear(start, row));
+            start = end;
+        }
+    }
+
     /// Shows the columns of a row, of those given, at which rays have to climb faster here than in another relief of
     /// the same window to be known to meet nothing; rows and columns count from the window's corner.
     pub(super) fn harder(
@@ -125,14 +140,11 @@ impl<'a> Relief<'a> {
         columns: Range<usize>,
         mut show: impl FnMut(Range<usize>),
     ) {
-        let mut start = columns.start;
-        while start < columns.end {
-            let end = ((start / PATCH + 1) * PATCH).min(columns.end);
-            if self.clear(start, row) > than.clear(start, row) {
-                show(start..end);
+        self.each_clear(row, columns, |columns, clear| {
+            if clear > than.clear(columns.start, row) {
+                show(columns);
             }
-            start = end;
-        }
+        });
     }
 
     fn at(&self, column: i64, row: i64) -> f64 {

@@ -84,11 +84,10 @@ impl Chunk {
         let window = heights.window;
         let (r, c) = ((row - window.row) as usize, (column - window.column) as usize);
         let line = |r: usize, c: usize| &heights.z_mm[r * window.columns + c..][..count];
-        for (k, clear2) in self.clear2[..count].iter_mut().enumerate() {
-            let clear = relief.clear(c + k, r);
-            *clear2 = clear * clear;
-        }
-        (0..count).for_each(|k| self.across[k] = k as f64);
+        relief.each_clear(r, c..c + count, |columns, clear| {
+            self.clear2[columns.start - c..columns.end - c].fill(clear * clear);
+        });
+        (0..count).for_each(|k| self.across[k] = f64::from(k as i32));
         let rows = [line(r, c), line(r, c - 1), line(r, c + 1), line(r - 1, c), line(r + 1, c)];
         widest(self, &rows, &About::new(stage, relief.step_mm(), row, column), outlines);
     }

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::super::contact::Contact;
 use super::above::{Above, GROUP, lanes};
-use super::band::Band;
+use super::band::{Band, highest};
 use super::bite::Watch;
 use super::leg::Leg;
 use super::{OVERLAP_MM, REACH_MM};
@@ -187,13 +187,52 @@ impl Band<'_> {
             let at = &at[..meant.end.next_multiple_of(GROUP)];
             let range = lines.work_out::<C, AXIS>(contact, (leg, next), (start, at), &samples);
             if range.0 < range.1 {
-                if AXIS == 0 {
+                if AXIS == 0 && C::FLAT && leg.lean.m == 0.0 {
+                    self.level(lines, leg, start, meant, motion, watch);
+                } else if AXIS == 0 {
                     self.along_x::<C, V>(lines, contact, leg, (start, meant, range), motion, watch);
                 } else {
                     self.along_y::<C, V>(lines, contact, leg, (start, meant, range), motion, watch);
                 }
             }
             line += count;
+        }
+    }
+
+    /// A flat on a level move, lines being rows: all that it covers is cut to one height.
+    #[inline(always)]
+    fn level(
+        &mut self,
+        lines: &Lines,
+        leg: &Leg,
+        start: usize,
+        meant: Range<usize>,
+        motion: usize,
+        watch: &mut Watch,
+    ) {
+        let new = leg.from[2] as f32;
+        for i in meant {
+            let first = lines.body[0][i].min(lines.cap[0][i]) as usize;
+            let end = lines.body[1][i].max(lines.cap[1][i]) as usize;
+            if first >= end {
+                continue;
+            }
+            let row = start + i;
+            let z_mm = &mut self.z_mm[row * self.window.columns..][first..end];
+            let highest = highest(z_mm);
+            if highest <= new {
+                continue;
+            }
+            // The first of those from which the deepest layer of this row is taken.
+            let depth = highest - new;
+            if watch.wants(depth, motion)
+                && let Some(at) = z_mm.iter().position(|z| z - new == depth)
+            {
+                watch.see(z_mm[at], new, motion, row, first + at);
+            }
+            for z in z_mm {
+                *z = if new < *z { new } else { *z };
+            }
         }
     }
 

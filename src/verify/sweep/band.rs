@@ -180,7 +180,7 @@ impl Band<'_> {
 
 /// The highest of all that are numbers, found in as many places at once as vectors have.
 #[inline(always)]
-fn highest(z_mm: &[f32]) -> f32 {
+pub(super) fn highest(z_mm: &[f32]) -> f32 {
     let higher = |a: f32, b: f32| if b > a { b } else { a };
     let mut most = [f32::NEG_INFINITY; GROUP];
     let groups = z_mm.chunks_exact(GROUP);
@@ -190,5 +190,91 @@ fn highest(z_mm: &[f32]) -> f32 {
             *most = higher(*most, *z);
         }
     }
-    most.into_iter().chain(rest).fold(f32::NEG_INFINITY, higher)
+    // Halves on halves, which waits less than one after the other.
+    let mut half = GROUP / 2;
+    while half > 0 {
+        for k in 0..half {
+            most[k] = higher(most[k], most[k + half]);
+        }
+        half /= 2;
+    }
+    rest.fold(most[0], higher)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::above::Portable;
+    use super::super::along::LINES;
+    use super::*;
+    use crate::cutter::Shape;
+    use crate::verify::contact::with_contact;
+    use crate::verify::{Options, Reading};
+
+    /// Passes along x over hills, half of them level, that come back deeper.
+    fn reading() -> Reading {
+        let mut text = String::from("G21 G90 M3\nG0 Z2\nG0 X0 Y0\nF300\n");
+        for pass in 0..40 {
+            let y = 0.03 * f64::from(pass % 20);
+            let deep = -0.1 - 0.1 * f64::from(pass / 20);
+            text += &format!("G0 Z1\nG0 X-0.1 Y{y:.4}\nG1 Z{deep:.4}\n");
+            for k in 1..=14 {
+                let x = -0.1 + 0.14 * f64::from(k);
+                let hill = if pass % 4 < 2 { 0.0 } else { 0.08 * (5.0 * x + y).sin() };
+                text += &format!("G1 X{x:.4} Z{:.4}\n", deep + hill);
+            }
+        }
+        Reading::of((text + "G0 Z2\nM2\n").as_bytes(), &Options::default()).expect("a program")
+    }
+
+    fn cut(shape: &Shape, each: impl FnOnce(&mut Band, &Judged)) -> Vec<f32> {
+        let window = Window { column: -20, row: -20, columns: 210, rows: LINES };
+        // Hills and holes, so that some blocks stand above the cutter and others do not.
+        let stock = |k: usize| match (k % window.columns, k / window.columns) {
+            (column, row) if (column + row) % 97 == 0 => f32::NAN,
+            (column, row) => 0.05 - 0.2 * ((column / 40 + row / 16) % 3) as f32,
+        };
+        let mut z_mm: Vec<f32> = (0..window.samples()).map(stock).collect();
+        let places = |first: i64, count: usize| -> Vec<f64> {
+            (0..count + LINES).map(|k| ((first + k as i64) as f64 + 0.5) * 0.01).collect()
+        };
+        let (x_mm, y_mm) = (places(window.column, window.columns), places(window.row, window.rows));
+        let reading = reading();
+        let judged = Judged::new(&reading, *shape, [0.0; 3]);
+        let mut band = Band { z_mm: &mut z_mm, x_mm: &x_mm, y_mm, per_mm: 100.0, window, datum_mm: 0.0 };
+        each(&mut band, &judged);
+        z_mm
+    }
+
+    #[test]
+    fn moves_along_the_samples_cut_what_any_move_cuts() {
+        for name in ["ball:0.6", "flat:0.5", "bull:0.6:0.1", "vee:60:0.1:0.7", "taper:0.2:10:0.6"] {
+            let shape: Shape = name.parse().expect("a cutter");
+            let mut watch = Watch::NOTHING;
+            let oblique = cut(&shape, |band, judged| {
+                with_contact!(&shape, contact => {
+                    let leg = |index: usize| Leg::of(&contact, judged, index, 0.0);
+                    for index in 0..judged.reading.motions.len() {
+                        let (Some(this), next) = (leg(index), leg((index + 1).min(judged.reading.motions.len() - 1))) else { continue };
+                        match this.lie {
+                            Lie::Nothing => {}
+                            Lie::Point => band.disc(&contact, &this, index, &mut watch),
+                            _ => band.oblique(&contact, (&this, next.as_ref()), index, &mut watch),
+                        }
+                    }
+                })
+            });
+            let mut found = ProgramCut::default();
+            let along = cut(&shape, |band, judged| {
+                found = with_contact!(&shape, contact => band.take::<_, Portable>(contact, judged));
+            });
+            let cuts = oblique.iter().filter(|z| **z < -0.16).count();
+            assert!(cuts > 1000, "{name}: {cuts}");
+            for (k, (a, b)) in along.iter().zip(&oblique).enumerate() {
+                let same = (a.is_nan() && b.is_nan()) || (a - b).abs() < 2e-6;
+                assert!(same, "{name}: {a} and {b} at sample {k}");
+            }
+            let deepest = found.deepest_bite_mm();
+            assert!((deepest - f64::from(watch.depth)).abs() < 2e-6, "{name}: {deepest} and {}", watch.depth);
+        }
+    }
 }

@@ -46,7 +46,12 @@ impl Leg {
         let known = index.checked_sub(1).map(|i| &motions[i]).filter(|m| m.known());
         let from = known.map_or(to, |m| place(m.to_mm));
         let delta: [f64; 3] = std::array::from_fn(|axis| to[axis] - from[axis]);
-        let length = delta[0].hypot(delta[1]);
+        // Along an axis, as most moves are, the root of a square is the number itself.
+        let length = match delta {
+            [x, 0.0, _] => x.abs(),
+            [0.0, y, _] => y.abs(),
+            [x, y, _] => x.hypot(y),
+        };
         let rapid = judged.rapid(index);
         let vertical = length < SHORT_MM;
         let class = match (rapid, vertical && delta[2] < 0.0) {
