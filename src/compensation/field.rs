@@ -102,9 +102,11 @@ impl Field {
     /// Becomes [`Field::of`] these, in the memory it has.
     pub fn fill(&mut self, h: &Heights, window: Window, sense: Sense) {
         self.hold(window, usize::MAX);
-        for row in -1..=window.rows as i64 {
-            self.take(row, h, window, sense);
-        }
+        pulp::Arch::new().dispatch(move || {
+            for row in -1..=window.rows as i64 {
+                self.take(row, h, window, sense);
+            }
+        });
     }
 
     /// Becomes a field of this size that holds so many rows, at least, once they are taken.

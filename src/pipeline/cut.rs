@@ -233,6 +233,7 @@ fn judged(
         most_pixels: light_picture::MOST_PIXELS,
     };
     progress.begin("judge", (lattice.columns * lattice.rows) as u64);
+    crate::memory::give_back();
     let offset_mm = tile.piece.origin_mm.z;
     let mut maps = Maps::create(staging, &tile.setup.tile.name, &lattice, job.maps.full, offset_mm)?;
     // Shanks and holders are followed by one thread, beside the blocks.
