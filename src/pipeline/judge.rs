@@ -16,7 +16,9 @@ use crate::toolpath::{Axis, Layout};
 use crate::verify::{self, Blank, Judged, ProgramCut};
 
 const BLOCK_COLUMNS: usize = 2048;
-const BLOCK_ROWS: usize = 1024;
+const BLOCK_ROWS: usize = 800;
+/// Blocks begin at multiples of this, as what is bounded by squares does.
+const BLOCK_STEP: usize = 16;
 /// Rows that are handed on together.
 const STRIP_ROWS: usize = 128;
 
@@ -220,9 +222,13 @@ impl Sums {
     }
 }
 
-/// The blocks of a tile, row by row, lowest y first.
+/// The blocks of a tile, row by row, lowest y first; all about as large, as what a block sees around itself is worked
+/// out for narrow ones too.
 pub fn blocks(lattice: &Lattice) -> Vec<Vec<Window>> {
-    blocks_of(lattice, [BLOCK_COLUMNS, BLOCK_ROWS])
+    let alike = |samples: usize, most: usize| {
+        samples.div_ceil(samples.div_ceil(most).max(1)).next_multiple_of(BLOCK_STEP).clamp(BLOCK_STEP, most)
+    };
+    blocks_of(lattice, [alike(lattice.columns, BLOCK_COLUMNS), alike(lattice.rows, BLOCK_ROWS)])
 }
 
 /// Blocks of so many columns and rows, row by row, lowest y first.
