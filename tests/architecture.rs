@@ -4,12 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom; a room imports from rooms above it only.
-const ORDER: [&str; 22] = [
+const ORDER: [&str; 23] = [
     "settings",
     "catalogue",
     "progress",
     "whole",
     "grid",
+    "memory",
     "tolerance",
     "cutter",
     "optics",
