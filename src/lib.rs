@@ -24,6 +24,7 @@ extern crate self as screenmill;
 pub mod catalogue;
 pub mod cutter;
 pub mod grid;
+pub mod in_order;
 pub mod memory;
 pub mod optics;
 pub mod progress;

@@ -4,11 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Top to bottom; a room imports from rooms above it only.
-const ORDER: [&str; 23] = [
+const ORDER: [&str; 24] = [
     "settings",
     "catalogue",
     "progress",
     "whole",
+    "in_order",
     "grid",
     "memory",
     "tolerance",

@@ -1,8 +1,6 @@
 //! One tile's cut, block by block: the design, the closing by every cutter, the exact passes and the surface that the
 //! read-back programs leave, all at full resolution and none of it held beyond a row of blocks.
 
-use rayon::prelude::*;
-
 use super::Error;
 use super::light::{self, Sight};
 use crate::compensation::{self, Closings, Profile, RowPass, RowTarget, Tables};
@@ -10,6 +8,7 @@ use crate::fidelity::cavities::{self, Labelled};
 use crate::fidelity::light::LightTally;
 use crate::fidelity::{self, Cavities, Found, Layers, Lower, Peaks, Pixels, Tally, polish};
 use crate::grid::{Heights, Lattice, Window};
+use crate::in_order::in_order;
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::toolpath::{Axis, Layout};
@@ -115,30 +114,30 @@ pub fn judge(
     let lattice = case.surface.lattice();
     let mut sums = Sums::new(case, &lattice);
     let empty = sums.pictures.clone();
-    let make = |row: &[Window]| -> Result<Vec<Block>, Error> {
-        row.par_iter()
-            .map(|&window| {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
-                let block = case.block(window, &empty);
-                progress.advance(window.samples() as u64);
-                block
-            })
-            .collect()
-    };
     let rows = blocks(&lattice);
-    let mut ready = rows.first().map_or(Ok(Vec::new()), |row| make(row))?;
-    for next in (1..).map(|k| rows.get(k)).take(rows.len()) {
-        let made = std::mem::take(&mut ready);
-        // What has to be done in order takes one thread; the others go on with the next row of blocks.
-        let (taken, next) = rayon::join(
-            || sums.take(made, lattice.columns, each),
-            || next.map_or(Ok(Vec::new()), |row| make(row)),
-        );
-        taken?;
-        ready = next?;
-    }
+    let windows = rows.concat();
+    let make = |index: usize| -> Result<Block, Error> {
+        if progress.interrupted() {
+            return Err(Error::Interrupted);
+        }
+        let window = windows[index];
+        let block = case.block(window, &empty);
+        progress.advance(window.samples() as u64);
+        block
+    };
+    // The blocks of a row are summed together; meanwhile, and while the last of a row are made, others of the next row are.
+    let mut columns = rows.iter().map(Vec::len);
+    let mut wanted = columns.next().unwrap_or(0);
+    let ahead = wanted.min(2 * rayon::current_num_threads()).max(2);
+    let mut row = Vec::new();
+    in_order(windows.len(), ahead, make, |block| {
+        row.push(block);
+        if row.len() == wanted {
+            sums.take(std::mem::take(&mut row), lattice.columns, each)?;
+            wanted = columns.next().unwrap_or(0);
+        }
+        Ok(())
+    })?;
     Ok(sums.verdict())
 }
 

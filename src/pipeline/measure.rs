@@ -1,7 +1,5 @@
 //! What cutters leave of a part at best: deviations, normals and light of their closings, block by block.
 
-use rayon::prelude::*;
-
 use super::Error;
 use super::check::Facts;
 use super::judge::blocks_of;
@@ -12,6 +10,7 @@ use crate::compensation::{self, Closings};
 use crate::fidelity::light::{Known, LightTally};
 use crate::fidelity::{self, Layers, Tally};
 use crate::grid::{Heights, Window};
+use crate::in_order::in_order;
 use crate::progress::Progress;
 
 /// Most cutters that are tried together.
@@ -19,9 +18,6 @@ pub(super) const MOST_CUTTERS: usize = 12;
 
 /// Samples along a side of a block: a closing needs twice the cutter's reach around it, which large blocks share.
 const BLOCK: usize = 2048;
-
-/// Blocks that are looked at before their sums are taken: enough that threads seldom wait for the last of them.
-const TOGETHER: usize = 8;
 
 /// What was measured of one set.
 #[derive(Clone)]
@@ -113,26 +109,24 @@ impl Facts<'_> {
             }
             tile.piece.hold()?;
             let sight = self.sight(tile);
-            for row in windows.chunks(TOGETHER) {
-                let measured: Vec<_> = row
-                    .par_iter()
-                    .map(|&window| {
-                        if progress.interrupted() {
-                            return Err(Error::Interrupted);
-                        }
-                        let done = self.block(tile, sight.as_ref(), window, sets);
-                        progress.advance(window.samples() as u64);
-                        done
-                    })
-                    .collect::<Result<_, Error>>()?;
-                for (sets, counts, light) in measured {
-                    for (total, set) in of.sets.iter_mut().zip(&sets) {
-                        total.add(set);
-                    }
-                    of.masks.push(counts);
-                    of.designed.merge(&light);
+            let make = |index: usize| {
+                if progress.interrupted() {
+                    return Err(Error::Interrupted);
                 }
-            }
+                let window = windows[index];
+                let done = self.block(tile, sight.as_ref(), window, sets);
+                progress.advance(window.samples() as u64);
+                done
+            };
+            let ahead = 2 * rayon::current_num_threads();
+            in_order(windows.len(), ahead, make, |(sets, counts, light)| {
+                for (total, set) in of.sets.iter_mut().zip(&sets) {
+                    total.add(set);
+                }
+                of.masks.push(counts);
+                of.designed.merge(&light);
+                Ok(())
+            })?;
             self.done(tile);
         }
         Ok(of)
