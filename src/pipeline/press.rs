@@ -89,10 +89,12 @@ impl Press<'_> {
         let options = verify::Options { rml_unit_mm: self.dialect.unit_mm, ..verify::Options::default() };
         let reading = Reading::from(&mut BufReader::with_capacity(1 << 20, open), &options)
             .map_err(|source| Error::ReadBack { path: file.clone(), source })?;
-        let extent = reading.extent();
         let known = reading.motions.iter().filter(|motion| motion.known()).map(|motion| motion.to_mm);
-        let lowest_mm = known.reduce(|lowest, place| if place[2] < lowest[2] { place } else { lowest });
-        let timing = verify::time(&reading, &(&self.shop.machine).into());
+        let lowest = |lowest: [f64; 3], place: [f64; 3]| if place[2] < lowest[2] { place } else { lowest };
+        let ((extent, lowest_mm), timing) = rayon::join(
+            || (reading.extent(), known.reduce(lowest)),
+            || verify::time(&reading, &(&self.shop.machine).into()),
+        );
         post::stamp_time(&mut out, &written, self.dialect, timing.total_s)?;
         out.flush().map_err(output)?;
         let tilt = program.path.tilt;

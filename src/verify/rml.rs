@@ -5,6 +5,7 @@
 //! out-of-range value is refused, where the machine would clamp it.
 
 use std::io::BufRead;
+use std::ops::Range;
 
 use super::error::{Error, Place};
 use super::reading::{Event, Language, Motion, Note, Options, Summary};
@@ -13,12 +14,13 @@ use super::reading::{Event, Language, Motion, Note, Options, Summary};
 const LOWEST: f64 = -8_388_608.0;
 const HIGHEST: f64 = 8_388_607.0;
 const MOST_NUMBERS: usize = 3 * 4096;
+const MOST_DIGITS: usize = 40;
 
 type Sink<'a> = dyn FnMut(&Event) -> Result<(), Error> + 'a;
 
 /// Reads RML-1 command by command.
 pub(super) fn read(source: &mut dyn BufRead, options: &Options, each: &mut Sink) -> Result<Summary, Error> {
-    let mut scanner = Scanner { source, next: None, line: 1, column: 0, bytes: 0 };
+    let mut scanner = Scanner::new(source);
     scanner.advance()?;
     let mut machine = Machine {
         unit_mm: options.rml_unit_mm,
@@ -91,8 +93,13 @@ const COMMANDS: [(&str, u8); 28] = [
     ("!ZE", 0),
 ];
 
-fn known(name: &str) -> Option<Command> {
-    COMMANDS.iter().find(|c| c.0 == name).map(|&(name, mode)| Command { name, mode })
+fn known(name: &[u8]) -> Option<Command> {
+    let same = |known: &str| known.as_bytes().first() == name.first() && known.as_bytes() == name;
+    COMMANDS.iter().find(|c| same(c.0)).map(|&(name, mode)| Command { name, mode })
+}
+
+fn spelled(name: &[u8]) -> String {
+    String::from_utf8_lossy(name).into_owned()
 }
 
 /// A parameter and where it stands.
@@ -102,8 +109,14 @@ struct Number {
     at: Place,
 }
 
+/// Bytes that are taken from the source at once.
+const CHUNK: usize = 1 << 16;
+
 struct Scanner<'a> {
     source: &'a mut dyn BufRead,
+    chunk: Box<[u8]>,
+    /// What of the chunk is not looked at yet.
+    left: Range<usize>,
     next: Option<u8>,
     line: u64,
     column: u64,
@@ -111,16 +124,24 @@ struct Scanner<'a> {
 }
 
 impl Scanner<'_> {
+    fn new(source: &mut dyn BufRead) -> Scanner<'_> {
+        let chunk = vec![0; CHUNK].into_boxed_slice();
+        Scanner { source, chunk, left: 0..0, next: None, line: 1, column: 0, bytes: 0 }
+    }
+
+    #[inline(always)]
     fn advance(&mut self) -> Result<(), Error> {
         let last = self.next;
-        self.next = self.source.fill_buf()?.first().copied();
+        if self.left.is_empty() {
+            self.left = 0..read_some(self.source, &mut self.chunk)?;
+        }
+        self.next = self.left.next().map(|place| self.chunk[place]);
         // CR alone ends a line too.
         if last == Some(b'\n') || (last == Some(b'\r') && self.next != Some(b'\n')) {
             self.line += 1;
             self.column = 0;
         }
         if let Some(byte) = self.next {
-            self.source.consume(1);
             self.column += 1;
             self.bytes += 1;
             if byte >= 0x7f || (byte < 0x20 && !matches!(byte, b'\t' | b'\r' | b'\n')) {
@@ -149,25 +170,16 @@ impl Scanner<'_> {
             b'0'..=b'9' | b'+' | b'-' | b'.' | b',' => return Err(Error::Loose { at }),
             mark @ (b'!' | b'^') => {
                 self.advance()?;
-                let mut name = String::new();
-                if mark == b'!' {
-                    name.push('!');
-                }
-                while name.len() < 2 + usize::from(mark == b'!') {
+                let mut name = [mark, 0, 0];
+                for place in 1..3 {
                     let Some(letter) = self.letter() else {
-                        return Err(Error::Command {
-                            at,
-                            name: format!("{}{}", first as char, name.trim_start_matches('!')),
-                        });
+                        return Err(Error::Command { at, name: spelled(&name[..place]) });
                     };
-                    name.push(letter as char);
+                    name[place] = letter;
                     self.advance()?;
                 }
-                let command = known(&name).filter(|c| c.mode != 1);
-                let command = command.ok_or_else(|| {
-                    let mark = if mark == b'^' { "^" } else { "" };
-                    Error::Command { at, name: format!("{mark}{name}") }
-                })?;
+                let command = known(&name[usize::from(mark == b'^')..]).filter(|c| c.mode != 1);
+                let command = command.ok_or_else(|| Error::Command { at, name: spelled(&name) })?;
                 // ^ makes a mode 2 command one of mode 1.
                 Command { mode: if mark == b'^' { 1 } else { 0 }, ..command }
             }
@@ -177,13 +189,13 @@ impl Scanner<'_> {
             }
             letter @ b'A'..=b'Z' => {
                 self.advance()?;
-                let pair = self.letter().map(|second| format!("{}{}", letter as char, second as char));
-                if let Some(command) = pair.as_deref().and_then(known) {
+                let second = self.letter();
+                if let Some(command) = second.and_then(|second| known(&[letter, second])) {
                     self.advance()?;
                     command
                 } else {
-                    let name = (letter as char).to_string();
-                    known(&name).ok_or_else(|| Error::Command { at, name: pair.unwrap_or(name) })?
+                    let name = || spelled(&[Some(letter), second].into_iter().flatten().collect::<Vec<u8>>());
+                    known(&[letter]).ok_or_else(|| Error::Command { at, name: name() })?
                 }
             }
             other => return Err(Error::Command { at, name: (other as char).to_string() }),
@@ -226,16 +238,42 @@ impl Scanner<'_> {
 
     fn number(&mut self) -> Result<f64, Error> {
         let at = self.at();
-        let mut text = String::new();
+        let mut text = [0; MOST_DIGITS];
+        let mut length = 0;
         while let Some(byte @ (b'0'..=b'9' | b'+' | b'-' | b'.')) = self.next {
-            text.push(byte as char);
-            if text.len() > 40 {
-                return Err(Error::Signs { at });
-            }
+            *text.get_mut(length).ok_or(Error::Signs { at })? = byte;
+            length += 1;
             self.advance()?;
         }
-        text.parse().map_err(|_| Error::Signs { at })
+        let text = &text[..length];
+        whole(text).or_else(|| std::str::from_utf8(text).ok()?.parse().ok()).ok_or(Error::Signs { at })
     }
+}
+
+/// Reads into the chunk; 0 at the end of the source.
+fn read_some(source: &mut dyn BufRead, chunk: &mut [u8]) -> std::io::Result<usize> {
+    loop {
+        match source.read(chunk) {
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            read => return read,
+        }
+    }
+}
+
+/// A number of up to 15 digits, which 64 bits hold exactly, with a sign or without: nearly all of them are. None for any other.
+fn whole(text: &[u8]) -> Option<f64> {
+    let (negative, digits) = match text {
+        [b'-', digits @ ..] => (true, digits),
+        digits => (false, digits),
+    };
+    if digits.is_empty() || digits.len() > 15 {
+        return None;
+    }
+    let mut value = 0u64;
+    for digit in digits {
+        value = 10 * value + u64::from(digit.is_ascii_digit().then(|| digit - b'0')?);
+    }
+    Some(if negative { -(value as f64) } else { value as f64 })
 }
 
 struct Machine {
@@ -265,7 +303,8 @@ fn ranged(number: Number, what: &'static str, low: f64, high: f64) -> Result<f64
 
 fn coordinate(number: Number) -> Result<f64, Error> {
     let value = ranged(number, "the coordinate in units", LOWEST, HIGHEST)?;
-    if value.fract() == 0.0 { Ok(value) } else { Err(Error::Fraction { at: number.at, value }) }
+    // Whole within the range, which is less than 32 bits hold.
+    if f64::from(value as i32) == value { Ok(value) } else { Err(Error::Fraction { at: number.at, value }) }
 }
 
 impl Machine {
@@ -472,5 +511,42 @@ impl Machine {
         }
         self.at_mm = to_mm;
         each(&Event::Move(Motion { to_mm, feed_mm_min: speed_mm_min as f32, line }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::Reading;
+
+    #[test]
+    fn whole_numbers_are_what_parsing_gives() {
+        for text in ["0", "-0", "-15", "007", "999999999999999", "-999999999999999"] {
+            let parsed: f64 = text.parse().expect("a number");
+            assert_eq!(whole(text.as_bytes()).map(f64::to_bits), Some(parsed.to_bits()), "{text}");
+        }
+        for text in ["", "-", "+1", "1.5", "1.", "--1", "1-2", "1234567890123456"] {
+            assert_eq!(whole(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn commands_over_the_end_of_a_chunk_are_read_and_refused_where_they_stand() {
+        let place = |line: usize| [line as i32 * 37 % 20_011, -(line as i32 % 997), -1 - line as i32 % 7];
+        let lines = 3 * CHUNK / 16;
+        let mut text = String::from("^DF\nV10\nZ0,0,0\n");
+        for [x, y, z] in (0..lines).map(place) {
+            text += &format!("Z{x},{y},{z}\r\n");
+        }
+        assert!(text.len() > 2 * CHUNK);
+        let reading = Reading::of(text.as_bytes(), &Options::default()).expect("a program");
+        for (k, motion) in reading.motions[1..].iter().enumerate() {
+            let units = motion.to_mm.map(|mm| (100.0 * mm).round() as i32);
+            assert_eq!((units, motion.line), (place(k), k as u32 + 4));
+        }
+        text += "Z1,2,3Q";
+        let error = Reading::of(text.as_bytes(), &Options::default()).expect_err("no command");
+        let at = Place { line: lines as u64 + 4, column: 7 };
+        assert!(matches!(&error, Error::Command { at: found, .. } if *found == at), "{error}");
     }
 }
