@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use super::segment::{End, NORMAL, Segment, Shape, TANGENTIAL};
+use super::segment::{End, Line, NORMAL, Segment, Shape, TANGENTIAL};
 use super::{Limits, SAME_PLACE, greater, greatest, least, lesser};
 
 /// ARC_BLEND_KINK_RATIO as delivered.
@@ -272,35 +272,17 @@ impl RoundedCorner {
     /// The segment that comes between the one before, which gives it what it took, and the next.
     pub fn segment(&self, limits: &Limits, before: &Segment) -> Segment {
         let length = self.length(before);
-        let mut blend = Segment {
-            shape: Shape::Blend,
-            circle: None,
-            end: End::Tangent,
-            parabola_before: false,
+        let along = Line {
+            unit: before.last,
             length,
-            nominal_length: length,
             requested: self.asked,
             speed_max: self.speed,
             acceleration: self.acceleration,
-            tangential: TANGENTIAL,
-            kink_speed: None,
-            kink_before: 0.0,
-            kink_after: 0.0,
-            settled: false,
-            gain2: 0.0,
-            spread_speed: 0.0,
-            end_speed: 0.0,
-            at_peak: false,
-            active: false,
-            progress: 0.0,
-            speed: 0.0,
-            ramp: false,
-            ending: None,
-            done: false,
-            braking: false,
-            handing_over: false,
-            ..*before
+            end: End::Tangent,
+            tolerance: before.tolerance,
+            rapid: before.rapid,
         };
+        let mut blend = Segment { shape: Shape::Blend, first: before.first, ..along.segment() };
         blend.settle(limits.period);
         blend
     }
