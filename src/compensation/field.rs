@@ -1,6 +1,6 @@
 use super::lanes::{LANES, LEAST, NONE, Vectors, groups, groups_mut};
-use super::memory::untouched;
 use crate::grid::{Heights, Window};
+use crate::memory::untouched;
 
 /// Positions that the widest kernel takes at once.
 pub(super) const TILE: usize = 4 * LANES;

@@ -4,10 +4,10 @@ use super::Tables;
 use super::chord::flat_bottom;
 use super::field::{Field, Sense, Targets};
 use super::lanes::LANES;
-use super::memory::untouched;
 use super::tiles::OnTile;
 use super::way::Way;
 use crate::grid::{Heights, Window};
+use crate::memory::untouched;
 use std::ops::Range;
 
 /// Squares of samples, some of them marked.

@@ -35,7 +35,6 @@ mod interval;
 mod lanes;
 mod listed;
 mod marked;
-mod memory;
 mod meridian;
 mod pairs;
 mod passes;

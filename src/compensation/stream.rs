@@ -1,9 +1,9 @@
 use super::closing::left;
 use super::field::Sense;
-use super::memory::untouched;
 use super::strips::{AHEAD, Strips, in_strips, strip_bytes};
 use super::{Profile, RowPass, Tables, machined_by_rows};
 use crate::grid::{Heights, Lattice, Window};
+use crate::memory::untouched;
 use rayon::prelude::*;
 
 /// Samples of one band, about: what is held at once is a few bands and the cutter's reach.

@@ -3,13 +3,13 @@ use super::cones::Cones;
 use super::feed::{Fed, Feed};
 use super::field::{Field, Sense, Targets};
 use super::lanes::LANES;
-use super::memory::untouched;
 use super::pairs::OnSamples;
 use super::search::Progress;
 use super::stencil::Stencil;
 use super::way::{Way, has_table, is_searched, without_search};
 use super::{Profile, Tables, brute, contact};
 use crate::grid::{Heights, Window};
+use crate::memory::untouched;
 use rayon::prelude::*;
 
 /// Columns of one tile: its rows stay in a core's cache.
