@@ -1,7 +1,9 @@
 //! The surface of designed cells: exact planes at the samples, without triangles between.
 
-use std::sync::Arc;
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use lru::LruCache;
 use rayon::prelude::*;
 
 use super::envelope::{Planes, Rect, clip_to};
@@ -28,7 +30,16 @@ pub struct Designed {
     top_mm: f64,
     bottom_mm: f64,
     steepest: [f64; 2],
+    /// The outlines of the cells that were asked for last.
+    outlined: Mutex<LruCache<(i32, i32), Outlines>>,
 }
+
+/// Of the facets of one cell.
+type Outlines = Arc<Vec<Vec<[f64; 3]>>>;
+
+/// Rows of cells whose outlines are kept: a band of passes meets two or three, and all but one of them again in the next
+/// band. 150 cells of 200 facets a row are 6 MB.
+const OUTLINED_ROWS: usize = 4;
 
 pub(super) struct Cell {
     pub planes: Planes,
@@ -75,6 +86,7 @@ impl Designed {
         let stitched = design.seam == Seam::Stitched;
         let ring = i32::from(stitched);
         let carried = CellRange { c0: c0 - ring, r0: r0 - ring, c1: c1 + ring, r1: r1 + ring };
+        let outlined = OUTLINED_ROWS * material.columns().max(material.rows());
         let mut designed = Designed {
             sign: design.profile.sign(),
             design,
@@ -86,6 +98,7 @@ impl Designed {
             top_mm: f64::NAN,
             bottom_mm: f64::NAN,
             steepest: [0.0; 2],
+            outlined: Mutex::new(LruCache::new(NonZeroUsize::new(outlined).unwrap_or(NonZeroUsize::MIN))),
         };
         let Some(region) = designed.region() else { return Err(no_cells) };
         let extents = designed.prepare(&region)?;
@@ -248,6 +261,17 @@ impl Designed {
         lowest
     }
 
+    fn outlines_of(&self, cell: (i32, i32), sheet: &Rect) -> Outlines {
+        let outlined = || self.outlined.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = outlined().get(&cell) {
+            return Arc::clone(known);
+        }
+        let faces = self.faces_within(cell.0, cell.1, sheet).into_iter();
+        let made = Arc::new(faces.map(|face| face.outline_mm).collect());
+        outlined().put(cell, Arc::clone(&made));
+        made
+    }
+
     /// Column or row of cells (axis 0 or 1) of a point, and how it belongs there: see the type.
     pub(super) fn cell_index(&self, position_mm: f64, axis: usize) -> i32 {
         let (core, end) = if axis == 0 {
@@ -272,22 +296,18 @@ impl Surface for Designed {
 
     fn outlines(&self, low_mm: [f64; 2], high_mm: [f64; 2]) -> Vec<Vec<[f64; 3]>> {
         let half_mm = 0.5 * self.design.cell_mm;
+        let CellRange { c0, r0, c1, r1 } = self.material;
+        let reaches = |centre_mm: [f64; 2]| {
+            (0..2).all(|axis| {
+                let middle_mm = centre_mm[axis] - self.origin_mm[axis];
+                middle_mm + half_mm >= low_mm[axis] && middle_mm - half_mm <= high_mm[axis]
+            })
+        };
+        let all = (r0..r1).flat_map(|row| (c0..c1).map(move |column| (column, row)));
+        let cells: Vec<(i32, i32)> = all.filter(|&(column, row)| reaches(self.centre(column, row))).collect();
         let sheet = self.sheet();
-        let mut outlines = Vec::new();
-        for row in self.material.r0..self.material.r1 {
-            for column in self.material.c0..self.material.c1 {
-                let centre = self.centre(column, row);
-                let reaches = (0..2).all(|axis| {
-                    let middle_mm = centre[axis] - self.origin_mm[axis];
-                    middle_mm + half_mm >= low_mm[axis] && middle_mm - half_mm <= high_mm[axis]
-                });
-                if reaches {
-                    let faces = self.faces_within(column, row, &sheet);
-                    outlines.extend(faces.into_iter().map(|face| face.outline_mm));
-                }
-            }
-        }
-        outlines
+        let outlines: Vec<Outlines> = cells.par_iter().map(|&cell| self.outlines_of(cell, &sheet)).collect();
+        outlines.iter().flat_map(|outlines| outlines.iter().cloned()).collect()
     }
 
     fn bottom_mm(&self) -> f64 {
