@@ -10,7 +10,7 @@ use crate::surface::{Designed, Error, Level, Surface};
 
 /// What is always known of it, and its faces while they are held.
 pub struct Levelled {
-    flat: Designed,
+    flat: Arc<Designed>,
     lattice: Lattice,
     top_mm: f64,
     bottom_mm: f64,
@@ -20,7 +20,7 @@ pub struct Levelled {
 
 impl Levelled {
     /// Holds the faces of what was turned from `flat`.
-    pub fn new(flat: Designed, level: Level) -> Levelled {
+    pub fn new(flat: Arc<Designed>, level: Level) -> Levelled {
         let surface = level.surface;
         Levelled {
             flat,

@@ -19,6 +19,8 @@ use crate::surface::{self, Designed, Die, Surface, Walled};
 pub struct Part {
     /// The cells, if it is a designed screen.
     pub design: Option<Arc<Design>>,
+    /// All of them as they stand in the design.
+    flat: Option<Arc<Designed>>,
     pub scene: Option<Scene>,
     /// The whole part as it is cut: turned level if it is a mesh, turned into its die.
     pub whole: Arc<dyn Surface>,
@@ -101,6 +103,7 @@ impl Part {
                 let opened = surface::open(path, &options)?;
                 let mut part = Part {
                     design: None,
+                    flat: None,
                     scene: None,
                     whole: Arc::from(opened.surface),
                     notes: opened.notes,
@@ -148,11 +151,12 @@ impl Part {
             }
         };
         let design = Arc::new(design);
-        let whole = Designed::whole(Arc::clone(&design), spec.step_mm)?;
+        let flat = Arc::new(Designed::whole(Arc::clone(&design), spec.step_mm)?);
         let mut part = Part {
             design: Some(design),
+            whole: Arc::clone(&flat) as Arc<dyn Surface>,
+            flat: Some(flat),
             scene,
-            whole: Arc::new(whole),
             notes: Vec::new(),
             wedge_deg: [0.0; 2],
             undercuts: None,
@@ -226,7 +230,7 @@ impl Part {
                 let own = CellRange { c0, r0, c1: c0 + count(tile.width_mm), r1: r0 + count(tile.height_mm) };
                 let material = if one_sheet { design.core } else { own };
                 let size_mm = [tile.width_mm, tile.height_mm];
-                let piece = Designed::new(Arc::clone(design), material, [x_mm, tile.y_mm], size_mm, step_mm)?;
+                let piece = self.cut_out(design, material, [x_mm, tile.y_mm], size_mm, step_mm)?;
                 let piece: Arc<dyn Surface> = if job.part.level == Level::Plane {
                     let flat = piece;
                     let level = flat.levelled()?;
@@ -248,7 +252,7 @@ impl Part {
                     levelled = Some(Arc::clone(&turned));
                     turned
                 } else {
-                    Arc::new(piece)
+                    piece
                 };
                 if die { Arc::new(Die::new(piece)) } else { piece }
             }
@@ -266,6 +270,30 @@ impl Part {
             _ => surface,
         };
         Ok(TileSurface { surface, levelled, wedge_deg, undercuts: undercut, rotation, origin_mm })
+    }
+
+    /// A rectangle of the design. What its facets leave of each other is not worked out again for all of it.
+    fn cut_out(
+        &self,
+        design: &Arc<Design>,
+        material: CellRange,
+        origin_mm: [f64; 2],
+        [width_mm, height_mm]: [f64; 2],
+        step_mm: f64,
+    ) -> Result<Arc<Designed>, Error> {
+        let all = self.flat.as_ref().filter(|flat| {
+            let lattice = flat.lattice();
+            flat.material() == material
+                && flat.origin_mm() == origin_mm
+                && [lattice.width_mm, lattice.height_mm] == [width_mm, height_mm]
+        });
+        match all {
+            Some(flat) => Ok(Arc::clone(flat)),
+            None => {
+                let size_mm = [width_mm, height_mm];
+                Ok(Arc::new(Designed::new(Arc::clone(design), material, origin_mm, size_mm, step_mm)?))
+            }
+        }
     }
 
     /// A tile on whole samples of the part, with its neighbours if it is one sheet.
