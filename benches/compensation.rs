@@ -7,12 +7,12 @@
 mod surfaces;
 
 use npyz::WriterBuilder;
-use screenmill::compensation::{self, Closings, Profile, RowTarget, Tables, Way};
-use screenmill::grid::{Heights, Window};
+use screenmill::compensation::{self, Band, Closings, Profile, RowTarget, Tables, Way};
+use screenmill::grid::{Heights, Lattice, Window};
 use std::hint::black_box;
 use std::path::Path;
 use std::process::Command;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use surfaces::STEP_MM;
 
 const RADII: [usize; 5] = [10, 25, 50, 100, 150];
@@ -233,6 +233,7 @@ fn main() {
     }
     drops(scratch.path());
     two_threads(&h);
+    whole_part(&h);
     others(&h);
 }
 
@@ -274,6 +275,40 @@ fn two_threads(h: &Heights) {
         }
     }
     println!("two threads, ball CL, R = 100: {:.2} times one, wall time", least[0] / least[1]);
+}
+
+/// 20 x 20 cm, the domes side by side, band by band on two threads; reading, a copy here, is left out, and nothing is written.
+fn whole_part(h: &Heights) {
+    let (profile, lattice) = (ball(100), Lattice::covering(200.0, 200.0, STEP_MM));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool of threads");
+    for with_closing in [false, true] {
+        let took: Vec<String> = (0..5)
+            .map(|_| {
+                let (start, mut reading) = (Instant::now(), Duration::ZERO);
+                let read = |window: Window, z_mm: &mut [f32]| -> Result<(), ()> {
+                    let start = Instant::now();
+                    for (row, z_mm) in (window.row..).zip(z_mm.chunks_exact_mut(window.columns)) {
+                        let from = h.row(row % h.window.rows as i64);
+                        z_mm.chunks_mut(from.len())
+                            .for_each(|z_mm| z_mm.copy_from_slice(&from[..z_mm.len()]));
+                    }
+                    reading += start.elapsed();
+                    Ok(())
+                };
+                let each = |band: &mut Band| {
+                    black_box(band);
+                    Ok(())
+                };
+                let done = pool.install(|| {
+                    compensation::stream(&lattice, &profile, 1, with_closing, read, |_, _| Ok(()), each)
+                });
+                done.expect("nothing that could fail");
+                format!("{:.2}", (start.elapsed() - reading).as_secs_f64())
+            })
+            .collect();
+        let what = if with_closing { "locations and closing" } else { "locations" };
+        println!("20 x 20 cm, {what}, R = 100, two threads: {} s, wall time", took.join(", "));
+    }
 }
 
 /// Cutters and calls that the table leaves out, in ns a sample or position.
