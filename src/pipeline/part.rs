@@ -19,7 +19,7 @@ use crate::surface::{self, Designed, Die, Surface, Walled};
 pub struct Part {
     /// The cells, if it is a designed screen.
     pub design: Option<Arc<Design>>,
-    /// All of them as they stand in the design.
+    /// All of them as they stand in the design; None where they are turned as one.
     flat: Option<Arc<Designed>>,
     pub scene: Option<Scene>,
     /// The whole part as it is cut: turned level if it is a mesh, turned into its die.
@@ -164,6 +164,7 @@ impl Part {
         };
         if spec.level == Level::Plane && job.stock.blanks == Blanks::One {
             part.turned = Some(part.turn(job)?);
+            part.flat = None;
         }
         Ok(part)
     }
