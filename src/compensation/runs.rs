@@ -177,7 +177,7 @@ pub(super) fn raise_pair<V: Vectors>(
     out: &mut Targets,
 ) -> bool {
     let ([lo, hi], [low, high]) = (at.x, at.y);
-    if high != low + 1 || on.every != 1 || !(lo..=lo + 1).contains(&hi) {
+    if high != low + 1 || !(lo..=lo + 1).contains(&hi) {
         return false;
     }
     let (Some(one), Some(other)) = (on.stencil.arc(i64::from(low)), on.stencil.arc(i64::from(high))) else {
@@ -195,15 +195,15 @@ pub(super) fn raise_pair<V: Vectors>(
     let length = ((end - start) as usize).next_multiple_of(LANES);
     let from = (PAD as i64 + start + on.shift + i64::from(lo)) as usize;
     let row = on.input_row + run.a - on.target_row;
-    let first = (row - i64::from(high)).max(0);
-    let last = (row + rows as i64 - 1 - i64::from(low)).min(on.target_rows as i64 - 1);
+    let first = first_target((row - i64::from(high)) as i32, on.every as i32);
+    let end = first_target((row + rows as i64 - i64::from(low)) as i32, on.every as i32).min(on.target_rows);
     let s = [one.s(lo), other.s(lo), one.s(hi), other.s(hi)].map(V::splat);
-    for b in first..=last {
+    for b in first..end {
         // The rows before and after the block are samples like others.
-        let a = run.a + b - row + i64::from(low);
+        let a = run.a + b as i64 * on.every - row + i64::from(low);
         let one = &field.row(a)[from..][..length + 1];
         let other = &field.row(a + 1)[from..][..length + 1];
-        let to = groups_mut(&mut out.row_mut(b as usize)[start as usize..][..length]);
+        let to = groups_mut(&mut out.row_mut(b)[start as usize..][..length]);
         if lo == hi {
             for ((to, one), other) in to.iter_mut().zip(groups(one)).zip(groups(other)) {
                 let best = V::greater(V::add(V::load(one), s[0]), V::load(to));
@@ -220,6 +220,13 @@ pub(super) fn raise_pair<V: Vectors>(
         }
     }
     true
+}
+
+/// The first target at this row of samples, counted from that of target 0, or above it.
+#[inline(always)]
+fn first_target(row: i32, every: i32) -> usize {
+    let row = row.max(0) as u32;
+    if every == 1 { row as usize } else { row.div_ceil(every as u32) as usize }
 }
 
 /// The first row of a block, counted from where row 0 belongs to the target `row` (in rows of
