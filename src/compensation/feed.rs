@@ -1,9 +1,11 @@
 use super::ball::FARTHEST;
 use super::blocks::ROWS;
 use super::field::{Field, Sense, Targets};
+use super::held::Rows;
 use super::lanes::Vectors;
+use super::outlet::Outlet;
 use super::pairs::OnSamples;
-use crate::grid::{Heights, Window};
+use crate::grid::Window;
 
 /// Bytes of targets that a core's cache may well hold until they are looked at.
 const CACHE: usize = 1 << 20;
@@ -39,7 +41,7 @@ impl Ahead<'_> {
 /// Takes rows into a field shortly before they are looked at, and gives those targets that nothing
 /// raises any more: both stay in a core's cache however tall they are.
 pub(super) struct Feed<'a, 'b> {
-    h: &'a Heights,
+    h: Rows<'a>,
     input: Window,
     sense: Sense,
     reach: i64,
@@ -47,7 +49,7 @@ pub(super) struct Feed<'a, 'b> {
     /// Row of the field at whose height target 0 stands.
     level: i64,
     /// Where those from `first` on go.
-    to: &'a mut [&'b mut [f32]],
+    to: &'a mut [Outlet<'b>],
     first: usize,
     /// Whether they are too many for a core's cache.
     is_large: bool,
@@ -57,17 +59,17 @@ pub(super) struct Feed<'a, 'b> {
 impl<'a, 'b> Feed<'a, 'b> {
     /// Makes field and targets ready.
     pub fn new(
-        h: &'a Heights,
+        h: Rows<'a>,
         input: Window,
         sense: Sense,
         on: &OnSamples,
-        to: &'a mut [&'b mut [f32]],
+        to: &'a mut [Outlet<'b>],
         field: &mut Field,
         targets: &mut Targets,
     ) -> Feed<'a, 'b> {
         let far = FARTHEST.min(on.reach as usize) + 1;
         field.hold(input, ROWS + 2 * far);
-        let columns = to.first().map_or(0, |to| to.len());
+        let columns = to.first().map_or(0, |row| row.to.len());
         targets.hold(columns, on.target_rows, (ROWS + 2 * on.reach as usize) / on.every as usize + 2);
         let fed = Fed { taken: -1, given: 0 };
         Feed::again(h, input, sense, on, to, 0, fed)
@@ -75,16 +77,16 @@ impl<'a, 'b> Feed<'a, 'b> {
 
     /// Goes on where field and targets were left, at the target `first`. `h` has all rows that were not taken.
     pub fn again(
-        h: &'a Heights,
+        h: Rows<'a>,
         input: Window,
         sense: Sense,
         on: &OnSamples,
-        to: &'a mut [&'b mut [f32]],
+        to: &'a mut [Outlet<'b>],
         first: usize,
         fed: Fed,
     ) -> Feed<'a, 'b> {
         let level = on.target_row - on.input_row;
-        let is_large = to.iter().map(|to| size_of_val(&**to)).sum::<usize>() > CACHE;
+        let is_large = to.iter().map(|row| size_of_val(&*row.to)).sum::<usize>() > CACHE;
         let (reach, every) = (on.reach, on.every);
         Feed { h, input, sense, reach, every, level, to, first, is_large, fed }
     }
@@ -141,12 +143,8 @@ impl<'a, 'b> Feed<'a, 'b> {
     #[inline(always)]
     fn give<V: Vectors>(&mut self, targets: &mut Targets) {
         targets.open(self.fed.given + 1);
-        let (to, from) = (&mut *self.to[self.fed.given - self.first], targets.row(self.fed.given));
-        if self.is_large {
-            self.sense.stream_row::<V>(to, from);
-        } else {
-            self.sense.give_row(to, from);
-        }
+        let row = &mut self.to[self.fed.given - self.first];
+        row.give::<V>(self.sense, targets.row(self.fed.given), self.is_large);
         targets.close();
         self.fed.given += 1;
     }

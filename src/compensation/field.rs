@@ -1,5 +1,6 @@
+use super::held::Rows;
 use super::lanes::{LANES, LEAST, NONE, Vectors, groups, groups_mut};
-use crate::grid::{Heights, Window};
+use crate::grid::Window;
 use crate::memory::untouched;
 
 /// Positions that the widest kernel takes at once.
@@ -93,14 +94,14 @@ impl Field {
     }
 
     /// The samples of `window`, as far as `h` has them.
-    pub fn of(h: &Heights, window: Window, sense: Sense) -> Field {
+    pub fn of(h: Rows<'_>, window: Window, sense: Sense) -> Field {
         let mut field = Field::empty(0, 0);
         field.fill(h, window, sense);
         field
     }
 
     /// Becomes [`Field::of`] these, in the memory it has.
-    pub fn fill(&mut self, h: &Heights, window: Window, sense: Sense) {
+    pub fn fill(&mut self, h: Rows<'_>, window: Window, sense: Sense) {
         self.hold(window, usize::MAX);
         pulp::Arch::new().dispatch(move || {
             for row in -1..=window.rows as i64 {
@@ -123,7 +124,7 @@ impl Field {
 
     /// Takes a row, from -1 to `rows`, of the samples of `window`.
     #[inline(always)]
-    pub fn take(&mut self, row: i64, h: &Heights, window: Window, sense: Sense) {
+    pub fn take(&mut self, row: i64, h: Rows<'_>, window: Window, sense: Sense) {
         let to = self.padded_mut(row);
         let row = window.row + row;
         match h.window.intersection(&window).filter(|shared| row >= shared.row && row < shared.row_end()) {
@@ -156,7 +157,8 @@ impl Field {
 }
 
 /// The first of these that starts a cache line.
-fn line(z: &[f32]) -> usize {
+#[inline(always)]
+pub(super) fn line(z: &[f32]) -> usize {
     z.as_ptr().align_offset(size_of::<[f32; LANES]>()).min(LANES)
 }
 

@@ -86,9 +86,9 @@ pub(super) fn by_flat(
     let Some(tile) = marked.hull(out) else { return };
     let wanted: Vec<Vec<Range<usize>>> =
         (tile.row..tile.row_end()).map(|row| marked.groups(tile, row)).collect();
-    let of = OnTile::new(h, tables, 1, sense, Way::Known);
+    let of = OnTile::new(h.into(), tables, 1, sense, Way::Known);
     let (input, pairs) = of.pairs(tile);
-    field.fill(h, input, sense);
+    field.fill(h.into(), input, sense);
     targets.clear(tile.columns, tile.rows);
     flat_bottom(field, &pairs, targets, profile.plateau_mm() / profile.step_mm() + 1.0, Some(&wanted));
     let column = (tile.column - out.column) as usize;

@@ -136,7 +136,7 @@ fn few_rows(h: &Heights, tables: &Tables, targets: &[RowTarget]) -> Vec<Vec<f32>
         slack_mm: stencils.iter().fold(0.0, |m, s| s.slack_mm.max(m)),
     };
     let mut done = Targets::new(columns, rows.len());
-    dilate(&mut Field::of(h, input, Sense::Raise), &pairs, profile, &mut done);
+    dilate(&mut Field::of(h.into(), input, Sense::Raise), &pairs, profile, &mut done);
     targets
         .iter()
         .enumerate()

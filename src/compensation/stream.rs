@@ -1,10 +1,13 @@
 use super::closing::left;
 use super::field::Sense;
+use super::held::{Held, Rows};
+use super::outlet::{Beside, Closed, Outlet};
 use super::strips::{AHEAD, Strips, in_strips, strip_bytes};
 use super::{Profile, RowPass, Tables, machined_by_rows};
-use crate::grid::{Heights, Lattice, Window};
+use crate::grid::{Lattice, Window};
 use crate::memory::untouched;
 use rayon::prelude::*;
+use std::sync::atomic::AtomicU32;
 
 /// Samples of one band, about: what is held at once is a few bands and the cutter's reach.
 const BAND_SAMPLES: usize = 1 << 24;
@@ -70,51 +73,12 @@ pub fn stream_bytes(lattice: &Lattice, profile: &Profile, with_closing: bool) ->
     let width = lattice.columns + 2 * halo;
     // The part and the rows cut, with what lies around them, and two bands of results with what a file takes of one.
     let results = if with_closing { 3 } else { 1 };
-    let rows = 2 * (rows + 2 * (halo + reach + AHEAD)) + (2 * results + 1) * rows;
+    let held = most_rows(rows, reach, halo);
+    let held =
+        held[0].min(lattice.rows) + if with_closing { held[1].min(lattice.rows + 2 * halo) } else { 0 };
+    let rows = held + (2 * results + 1) * rows;
     let strips = strip_bytes(&tables, width) * if with_closing { 2 } else { 1 };
     4 * width as u64 * rows as u64 + strips
-}
-
-/// Rows of samples that follow each other: the lowest ones go when they are no longer needed.
-struct Held {
-    heights: Heights,
-}
-
-impl Held {
-    /// None yet; the first will be the row `window.row`.
-    fn new(window: Window) -> Held {
-        Held { heights: Heights { window: Window { rows: 0, ..window }, z_mm: Vec::new() } }
-    }
-
-    fn end(&self) -> i64 {
-        self.heights.window.row_end()
-    }
-
-    /// Makes room for so many rows more, whose samples are to be written.
-    fn more(&mut self, rows: usize) -> (Window, &mut [f32]) {
-        let Heights { window, z_mm } = &mut self.heights;
-        let new = Window { row: window.row_end(), rows, ..*window };
-        let held = window.samples();
-        window.rows += rows;
-        if window.samples() > z_mm.len() {
-            if window.samples() > z_mm.capacity() {
-                let before = std::mem::take(z_mm);
-                untouched(z_mm, window.samples());
-                z_mm[..held].copy_from_slice(&before[..held]);
-            }
-            z_mm.resize(window.samples(), 0.0);
-        }
-        (new, &mut z_mm[held..][..new.samples()])
-    }
-
-    /// Lets the rows before this one go.
-    fn keep_from(&mut self, row: i64) {
-        let Heights { window, z_mm } = &mut self.heights;
-        let gone = (row - window.row).clamp(0, window.rows as i64) as usize;
-        z_mm.copy_within(gone * window.columns..window.samples(), 0);
-        window.row += gone as i64;
-        window.rows -= gone;
-    }
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -133,59 +97,101 @@ fn by_rows<E>(
     let part = lattice.window();
     let halo = if with_closing { reach } else { 0 };
     let rows_at_once = rows_at_once.next_multiple_of(every);
-    let mut h = Held::new(part);
+    let most = most_rows(rows_at_once.min(part.rows), reach, halo);
+    let mut h = Held::new(part, most[0].min(part.rows));
     // Positions that are held: row k of these is the part's row k `every`.
     let lowest = -((halo / every) as i64);
     let positions = Window { row: lowest, columns: part.columns + 2 * halo, ..part.grown(halo) };
-    let mut cut = Held::new(positions);
+    let most_cut = most[1].min(part.rows + 2 * halo).div_ceil(every) + 2;
+    let mut cut = Held::new(positions, if with_closing { most_cut } else { 0 });
     let all =
         Window { row: lowest * every as i64, rows: part.rows + halo + halo / every * every, ..positions };
     let mut locations = Strips::new(tables, all, every, Sense::Raise);
     let mut closings = Strips::new(tables, part, 1, Sense::Lower);
     let mut band = Band::default();
+    let mut samples = Vec::new();
     for row in (0..part.rows).step_by(rows_at_once) {
         (band.row, band.rows) = (row, rows_at_once.min(part.rows - row));
         let end = (row + band.rows) as i64;
         // Positions that closing looks at, and samples that these look at.
         let beyond = if with_closing { halo + AHEAD } else { 0 } as i64;
         let cut_end = (end + beyond).min(all.row_end());
-        let rows = ((cut_end - 1).div_euclid(every as i64) + 1 - cut.end()).max(0) as usize;
         let h_end = (cut_end + (reach + AHEAD) as i64).min(part.row_end());
-        let (window, z_mm) = h.more((h_end - h.end()).max(0) as usize);
-        read(window, z_mm)?;
-
-        let (new, z_mm) = if with_closing {
-            cut.more(rows)
-        } else {
-            untouched(&mut band.cl, rows * part.columns);
-            let new = Window { row: cut.end(), rows, ..part };
-            cut.heights.window.row += rows as i64;
-            (new, band.cl.as_mut_slice())
-        };
-        let new = Window { row: new.row * every as i64, ..new };
-        locations.rows(&h.heights, new.row, z_mm);
-        lift(new, z_mm)?;
-        if with_closing {
-            of_part(&cut.heights, every, &part, &mut band);
-            untouched(&mut band.closing, band.rows * part.columns);
-            if every == 1 {
-                closings.rows(&cut.heights, row as i64, &mut band.closing);
-            } else {
-                under_rows(&cut.heights, every, lattice, tables.profile(), &mut band);
+        for (window, z_mm) in h.more((h_end - h.end()).max(0) as usize) {
+            if window.rows > 0 {
+                read(window, z_mm)?;
             }
         }
-        finish(&h.heights, every, with_closing, &mut band);
+        samples.resize_with(band.rows, AtomicU32::default);
+        samples.iter_mut().for_each(|samples| *samples.get_mut() = 0);
+        if with_closing {
+            let rows = ((cut_end - 1).div_euclid(every as i64) + 1 - cut.end()).max(0) as usize;
+            let mut new = cut.more(rows);
+            let first = new[0].0.row * every as i64;
+            let to = new.iter_mut().flat_map(|(window, z_mm)| Outlet::plain(z_mm, window.columns)).collect();
+            locations.rows(h.rows(), first, to);
+            for (window, z_mm) in new {
+                if window.rows > 0 {
+                    lift(Window { row: window.row * every as i64, ..window }, z_mm)?;
+                }
+            }
+            if every == 1 {
+                closings.rows(cut.rows(), row as i64, closed(h.rows(), cut.rows(), &samples, &mut band));
+            } else {
+                of_part(cut.rows(), every, &part, &mut band);
+                under_rows(cut.rows(), every, lattice, tables.profile(), &mut band);
+            }
+        } else {
+            let rows = band.rows.div_ceil(every);
+            let new = Window { row: row as i64, rows, ..part };
+            untouched(&mut band.cl, new.samples());
+            let mut to = Outlet::plain(&mut band.cl, part.columns);
+            if every == 1 {
+                for ((to, samples), row) in to.iter_mut().zip(&samples).zip(new.row..) {
+                    to.beside = Some(Beside { h: h.rows().row(row), samples, closed: None });
+                }
+            }
+            locations.rows(h.rows(), new.row, to);
+            lift(new, &mut band.cl)?;
+        }
+        finish(h.rows(), every, with_closing, &mut samples, &mut band);
         each(&mut band)?;
 
         // The next band looks at the rows within reach of its first.
         cut.keep_from((end - halo as i64).div_euclid(every as i64));
-        h.keep_from((cut.end() * every as i64).min(end) - reach as i64);
+        h.keep_from(end - reach as i64);
     }
     Ok(())
 }
 
+/// Rows of the part, and of the positions that a closing of a band looks at, that are held at once.
+fn most_rows(band: usize, reach: usize, halo: usize) -> [usize; 2] {
+    let cut = if halo > 0 { band + 2 * halo + AHEAD } else { band };
+    [cut + 2 * reach + AHEAD, cut]
+}
+
+/// Where the closings of a band go, what they leave, and the locations within the part.
+fn closed<'b>(h: Rows<'b>, cut: Rows<'b>, samples: &'b [AtomicU32], band: &'b mut Band) -> Vec<Outlet<'b>> {
+    let columns = h.window.columns;
+    let Band { row, rows, cl, closing, residual, .. } = band;
+    for z_mm in [&mut *cl, &mut *closing, &mut *residual] {
+        untouched(z_mm, *rows * columns);
+    }
+    let beside = (h.window.column - cut.window.column) as usize;
+    let rows = closing.chunks_exact_mut(columns).zip(residual.chunks_exact_mut(columns));
+    rows.zip(cl.chunks_exact_mut(columns))
+        .zip(samples)
+        .zip(*row as i64..)
+        .map(|((((to, residual), cl), samples), row)| {
+            let cut = &cut.row(row)[beside..][..columns];
+            let closed = Some(Closed { residual, cut, cl });
+            Outlet { to, beside: Some(Beside { h: h.row(row), samples, closed }) }
+        })
+        .collect()
+}
+
 /// The locations at the band's rows that are cut, over the part's columns.
-fn of_part(cut: &Heights, every: usize, part: &Window, band: &mut Band) {
+fn of_part(cut: Rows<'_>, every: usize, part: &Window, band: &mut Band) {
     let columns = part.columns;
     untouched(&mut band.cl, band.rows.div_ceil(every) * columns);
     let first = (band.row / every) as i64;
@@ -199,7 +205,7 @@ fn of_part(cut: &Heights, every: usize, part: &Window, band: &mut Band) {
 }
 
 /// What rows `every` apart leave.
-fn under_rows(cut: &Heights, every: usize, lattice: &Lattice, profile: &Profile, band: &mut Band) {
+fn under_rows(cut: Rows<'_>, every: usize, lattice: &Lattice, profile: &Profile, band: &mut Band) {
     let passes: Vec<RowPass> = (cut.window.row..cut.window.row_end())
         .map(|row| RowPass {
             x0_mm: lattice.x_mm(cut.window.column),
@@ -211,15 +217,23 @@ fn under_rows(cut: &Heights, every: usize, lattice: &Lattice, profile: &Profile,
     band.closing = machined_by_rows(&passes, profile, window).z_mm;
 }
 
-/// No data where the part has none, what is left, and how many samples there are.
-fn finish(h: &Heights, every: usize, with_closing: bool, band: &mut Band) {
+/// No data where the part has none, what is left, and how many samples there are, as far as it is not found out on the
+/// way: rows that are cut `every` samples apart do not come by all samples.
+fn finish(h: Rows<'_>, every: usize, with_closing: bool, of_rows: &mut [AtomicU32], band: &mut Band) {
     let columns = h.window.columns;
     let Band { row, rows, samples, cl, closing, residual } = band;
     let first = *row;
     let row_of = |k: usize| h.row((first + k) as i64);
-    let samples_of = |k: usize| row_of(k).iter().map(|z| u32::from(!z.is_nan())).sum::<u32>();
-    let of_rows: Vec<u32> = (0..*rows).into_par_iter().with_min_len(ROWS).map(samples_of).collect();
+    if every > 1 {
+        of_rows.par_iter_mut().enumerate().with_min_len(ROWS).for_each(|(k, samples)| {
+            *samples.get_mut() = row_of(k).iter().map(|z| u32::from(!z.is_nan())).sum();
+        });
+    }
+    let of_rows: Vec<u32> = of_rows.iter_mut().map(|samples| *samples.get_mut()).collect();
     *samples = of_rows.iter().map(|&samples| u64::from(samples)).sum();
+    if every == 1 && with_closing {
+        return;
+    }
     let is_whole = |k: usize| of_rows[k] as usize == columns;
     cl.par_chunks_mut(ROWS * columns).enumerate().for_each(|(chunk, cl)| {
         for (k, cl) in cl.chunks_exact_mut(columns).enumerate() {
@@ -259,12 +273,13 @@ fn mask(z_mm: &mut [f32], part: &[f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compensation::{closing, cutter_location, erode};
+    use crate::compensation::{closing, cutter_location, cutter_location_rows, erode};
+    use crate::grid::Heights;
     use std::convert::Infallible;
 
     /// Waves with a hole.
-    fn part() -> (Lattice, Heights) {
-        let lattice = Lattice::covering(0.83, 1.57, 0.01);
+    fn part(width_mm: f64) -> (Lattice, Heights) {
+        let lattice = Lattice::covering(width_mm, 1.57, 0.01);
         let mut h = Heights::empty(lattice.window());
         for (i, z_mm) in h.z_mm.iter_mut().enumerate() {
             let (x, y) = ((i % lattice.columns) as f32, (i / lattice.columns) as f32);
@@ -277,11 +292,22 @@ mod tests {
 
     /// Bits of every band put together: locations, closing, residual.
     fn streamed(rows_at_once: usize, every: usize) -> [Vec<u32>; 3] {
-        let (lattice, h) = part();
+        streamed_of(&part(0.83), rows_at_once, every, true).0
+    }
+
+    /// The same, and how many samples were counted.
+    fn streamed_of(
+        (lattice, h): &(Lattice, Heights),
+        rows_at_once: usize,
+        every: usize,
+        with_closing: bool,
+    ) -> ([Vec<u32>; 3], u64) {
         let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
         let mut out = [Vec::new(), Vec::new(), Vec::new()];
+        let mut counted = 0;
         let each = |band: &mut Band| {
-            let Band { cl, closing, residual, .. } = std::mem::take(band);
+            let Band { cl, closing, residual, samples, .. } = std::mem::take(band);
+            counted += samples;
             for (out, z_mm) in out.iter_mut().zip([cl, closing, residual]) {
                 out.extend(z_mm.iter().map(|z| z.to_bits()));
             }
@@ -292,9 +318,39 @@ mod tests {
             Ok(())
         };
         let tables = Tables::new(profile);
-        let done = by_rows(rows_at_once, &lattice, &tables, every, true, read, |_, _| Ok(()), each);
+        let lift = |_, _: &mut [f32]| Ok(());
+        let done = by_rows(rows_at_once, lattice, &tables, every, with_closing, read, lift, each);
         assert!(done.is_ok());
-        out
+        (out, counted)
+    }
+
+    #[test]
+    fn strips_count_and_mask_as_tiles_do() {
+        let part = part(21.3);
+        let there = part.1.z_mm.iter().filter(|z| !z.is_nan()).count() as u64;
+        let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
+        let in_pool = |threads: usize, every: usize, with_closing: bool| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| {
+                assert_eq!(in_strips(&Tables::new(profile), part.0.columns), threads == 1);
+                streamed_of(&part, 50, every, with_closing)
+            })
+        };
+        for (every, with_closing) in [(1, false), (1, true), (3, false), (3, true)] {
+            let (strips, counted) = in_pool(1, every, with_closing);
+            assert_eq!(counted, there);
+            let (tiles, counted) = in_pool(4, every, with_closing);
+            assert_eq!(counted, there);
+            assert!(strips == tiles, "every {every}, with closing: {with_closing}");
+            let whole = cutter_location_rows(&part.1, &profile, part.1.window, every);
+            for ((k, cl), whole) in strips[0].iter().enumerate().zip(&whole.z_mm) {
+                let (row, column) = (k / part.0.columns * every, k % part.0.columns);
+                let is_there = !part.1.row(row as i64)[column].is_nan();
+                assert_eq!(f32::from_bits(*cl).is_nan(), !is_there);
+                assert!(!is_there || *cl == whole.to_bits());
+            }
+            assert_eq!(strips[1].len(), if with_closing { part.1.z_mm.len() } else { 0 });
+        }
     }
 
     #[test]
@@ -309,7 +365,7 @@ mod tests {
 
     #[test]
     fn a_stream_is_the_whole_with_holes_left_out() {
-        let (_, h) = part();
+        let (_, h) = part(0.83);
         let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
         let [cl, closed, _] = streamed(17, 1);
         let whole = [cutter_location(&h, &profile, h.window), closing(&h, &profile, h.window)];
@@ -324,7 +380,7 @@ mod tests {
     #[test]
     fn every_kth_row_cuts_past_open_edges_too() {
         let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
-        let (lattice, h) = part();
+        let (lattice, h) = part(0.83);
         let [_, closed, _] = streamed(1000, 4);
         let around = h.window.grown(profile.reach());
         let mut cl = cutter_location(&h, &profile, around);

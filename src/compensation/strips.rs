@@ -2,9 +2,11 @@ use super::Tables;
 use super::ball::FARTHEST;
 use super::blocks::ROWS;
 use super::field::{Field, Sense, Targets};
+use super::held::Rows;
+use super::outlet::Outlet;
 use super::tiles::{Going, OnTile, on_tiles, strip_columns};
 use super::way::{Way, is_searched};
-use crate::grid::{Heights, Window};
+use crate::grid::Window;
 use rayon::prelude::*;
 
 /// Rows past a cutter's reach that a search looks at before it gives a position.
@@ -70,12 +72,11 @@ impl<'a> Strips<'a> {
         Strips { tables, all, every, sense, width: width.unwrap_or(0), strips }
     }
 
-    /// The next rows from `row` on, as many as `to` has room for. `h` has the rows in reach and [`AHEAD`] more, as
+    /// The next rows from `row` on, one for each of `to`. `h` has the rows in reach and [`AHEAD`] more, as
     /// far as there are any.
-    pub fn rows(&mut self, h: &Heights, row: i64, to: &mut [f32]) {
-        let columns = self.all.columns;
-        let rows = to.len() / columns.max(1);
-        if rows == 0 {
+    pub fn rows(&mut self, h: Rows<'_>, row: i64, to: Vec<Outlet<'_>>) {
+        let rows = to.len();
+        if rows == 0 || self.all.columns == 0 {
             return;
         }
         let out = Window { row, rows: (rows - 1) * self.every + 1, ..self.all };
@@ -83,11 +84,11 @@ impl<'a> Strips<'a> {
             on_tiles(h, self.tables, out, self.every, self.sense, Way::Known, to);
             return;
         }
-        let mut of_strips: Vec<Vec<&mut [f32]>> = Vec::new();
+        let mut of_strips: Vec<Vec<Outlet<'_>>> = Vec::new();
         of_strips.resize_with(self.strips.len(), || Vec::with_capacity(rows));
-        for z_mm in to.chunks_exact_mut(columns) {
-            for (strip, z_mm) in of_strips.iter_mut().zip(z_mm.chunks_mut(self.width)) {
-                strip.push(z_mm);
+        for to in to {
+            for (strip, to) in of_strips.iter_mut().zip(to.split(self.width)) {
+                strip.push(to);
             }
         }
         let of = OnTile::new(h, self.tables, self.every, self.sense, Way::Known);
@@ -95,7 +96,7 @@ impl<'a> Strips<'a> {
         let strips = self.strips.par_iter_mut().with_max_len(1).zip(of_strips).enumerate();
         strips.for_each(|(k, (strip, mut to))| {
             let column = out.column + (k * width) as i64;
-            let tile = Window { column, row, columns: to[0].len(), rows };
+            let tile = Window { column, row, columns: to[0].to.len(), rows };
             of.go_on(tile, end, &mut to, &mut strip.scratch, &mut strip.going);
         });
     }
@@ -131,7 +132,8 @@ mod tests {
                         let mut in_bands = whole.clone();
                         for (k, z_mm) in in_bands.z_mm.chunks_mut(rows * all.columns).enumerate() {
                             z_mm.fill(0.0);
-                            strips.rows(h, all.row + (k * rows * every) as i64, z_mm);
+                            let to = Outlet::plain(z_mm, all.columns);
+                            strips.rows(h.into(), all.row + (k * rows * every) as i64, to);
                         }
                         assert!(bits(&in_bands.z_mm) == bits(&whole.z_mm), "{cutter} on {name}, {rows} rows");
                     }

@@ -2,7 +2,9 @@ use super::ball::Reachable;
 use super::cones::Cones;
 use super::feed::{Fed, Feed};
 use super::field::{Field, Sense, Targets};
+use super::held::Rows;
 use super::lanes::LANES;
+use super::outlet::Outlet;
 use super::pairs::OnSamples;
 use super::search::Progress;
 use super::stencil::Stencil;
@@ -81,20 +83,21 @@ pub(super) fn on_samples_into(
     done.window = Window { rows, ..out };
     // Every sample is written below.
     untouched(&mut done.z_mm, rows * out.columns);
-    on_tiles(h, tables, out, every, sense, way, &mut done.z_mm);
+    let to = Outlet::plain(&mut done.z_mm, out.columns);
+    on_tiles(h.into(), tables, out, every, sense, way, to);
 }
 
 /// Work on the samples of `out`, every `every`-th row, tile by tile.
 pub(super) fn on_tiles(
-    h: &Heights,
+    h: Rows<'_>,
     tables: &Tables,
     out: Window,
     every: usize,
     sense: Sense,
     way: Way,
-    done: &mut [f32],
+    to: Vec<Outlet<'_>>,
 ) {
-    if done.is_empty() {
+    if to.is_empty() || out.columns == 0 {
         return;
     }
     let profile = tables.profile();
@@ -109,11 +112,11 @@ pub(super) fn on_tiles(
     let share = (out.rows * across).div_ceil(2 * rayon::current_num_threads());
     let tile_rows = share.clamp(least, TILE_ROWS[1].max(least)).div_ceil(every);
     // Tile by tile, its rows of what is done.
-    let mut tiles: Vec<Vec<&mut [f32]>> = Vec::new();
+    let mut tiles: Vec<Vec<Outlet<'_>>> = Vec::new();
     tiles.resize_with(rows.div_ceil(tile_rows) * across, Vec::new);
-    for (row, z_mm) in done.chunks_exact_mut(columns).enumerate() {
-        for (column, z_mm) in z_mm.chunks_mut(width).enumerate() {
-            tiles[row / tile_rows * across + column].push(z_mm);
+    for (row, to) in to.into_iter().enumerate() {
+        for (column, to) in to.split(width).enumerate() {
+            tiles[row / tile_rows * across + column].push(to);
         }
     }
     let of = OnTile::new(h, tables, every, sense, way);
@@ -122,7 +125,7 @@ pub(super) fn on_tiles(
         let tile = Window {
             column: out.column + (k % across * width) as i64,
             row: out.row + (k / across * tile_rows * every) as i64,
-            columns: to[0].len(),
+            columns: to[0].to.len(),
             rows: to.len(),
         };
         of.dilate(tile, &mut to, scratch);
@@ -141,7 +144,7 @@ fn evenly(columns: usize, most: usize) -> usize {
 
 /// What is to be done on each tile: `tile.rows` rows, `every` apart.
 pub(super) struct OnTile<'a> {
-    h: &'a Heights,
+    h: Rows<'a>,
     profile: &'a Profile,
     stencil: &'a Stencil,
     cones: Option<&'a Cones>,
@@ -159,13 +162,13 @@ pub(super) struct Going {
 }
 
 impl<'a> OnTile<'a> {
-    pub fn new(h: &'a Heights, tables: &'a Tables, every: usize, sense: Sense, way: Way) -> OnTile<'a> {
+    pub fn new(h: Rows<'a>, tables: &'a Tables, every: usize, sense: Sense, way: Way) -> OnTile<'a> {
         let profile = tables.profile();
         let cones = has_table(profile, way).then(|| tables.cones());
         OnTile { h, profile, stencil: tables.on_samples(), cones, every: every as i64, sense, way }
     }
 
-    fn dilate(&self, tile: Window, to: &mut [&mut [f32]], (field, targets): &mut (Field, Targets)) {
+    fn dilate(&self, tile: Window, to: &mut [Outlet<'_>], (field, targets): &mut (Field, Targets)) {
         if is_searched(self.profile, self.way) {
             let (input, pairs) = self.pairs(tile);
             let mut feed = Feed::new(self.h, input, self.sense, &pairs, to, field, targets);
@@ -184,7 +187,7 @@ impl<'a> OnTile<'a> {
         &self,
         tile: Window,
         end: i64,
-        to: &mut [&mut [f32]],
+        to: &mut [Outlet<'_>],
         (field, targets): &mut (Field, Targets),
         going: &mut Option<Going>,
     ) {
@@ -208,7 +211,7 @@ impl<'a> OnTile<'a> {
         }
     }
 
-    fn without_search(&self, tile: Window, to: &mut [&mut [f32]], field: &mut Field, targets: &mut Targets) {
+    fn without_search(&self, tile: Window, to: &mut [Outlet<'_>], field: &mut Field, targets: &mut Targets) {
         let at_once = WHOLE_ROWS.max(2 * self.profile.reach()).div_ceil(self.every as usize);
         for (k, to) in to.chunks_mut(at_once).enumerate() {
             let row = tile.row + (k * at_once) as i64 * self.every;
@@ -218,7 +221,7 @@ impl<'a> OnTile<'a> {
             targets.clear(tile.columns, tile.rows);
             without_search(field, &pairs, self.profile, self.cones, targets, self.way);
             for (row, to) in to.iter_mut().enumerate() {
-                self.sense.give_row(to, targets.row(row));
+                to.give_portable(self.sense, targets.row(row));
             }
         }
     }
@@ -285,8 +288,8 @@ mod tests {
             every: 1,
             shift: halo,
         };
-        let field = Field::of(h, input, Sense::Raise);
-        let mut searched = Field::of(h, input, Sense::Raise);
+        let field = Field::of(h.into(), input, Sense::Raise);
+        let mut searched = Field::of(h.into(), input, Sense::Raise);
         let done = |fill: &mut dyn FnMut(&mut Targets)| {
             let mut targets = Targets::new(window.columns, window.rows);
             fill(&mut targets);
