@@ -13,9 +13,10 @@ pub(super) struct Outlet<'b> {
 
 /// What is found out beside it.
 pub(super) struct Beside<'b> {
-    /// The part's samples there, and where those with data are counted.
+    /// The part's samples there.
     pub h: &'b [f32],
-    pub samples: &'b AtomicU32,
+    /// Where those with data are counted, until they are: a search that is given up has given some rows already.
+    pub samples: Option<&'b AtomicU32>,
     /// What is made of a closing.
     pub closed: Option<Closed<'b>>,
 }
@@ -55,15 +56,14 @@ impl<'b> Outlet<'b> {
     /// Takes a row of targets; past the caches, if they are many.
     #[inline(always)]
     pub fn give<V: Vectors>(&mut self, sense: Sense, from: &[f32], are_many: bool) {
-        match &mut self.beside {
-            Some(Beside { h, samples, closed: Some(closed) }) => {
-                samples.fetch_add(closed.give::<V>(sense, self.to, from, h), Ordering::Relaxed);
-                return;
-            }
-            Some(Beside { h, samples, closed: None }) => {
+        if let Some(Beside { h, samples, closed }) = &mut self.beside {
+            if let Some(samples) = samples.take() {
                 samples.fetch_add(with_data::<V>(h), Ordering::Relaxed);
             }
-            None => {}
+            if let Some(closed) = closed {
+                closed.give::<V>(sense, self.to, from, h);
+                return;
+            }
         }
         if are_many {
             sense.stream_row::<V>(self.to, from);
@@ -113,18 +113,16 @@ fn with_data<V: Vectors>(h: &[f32]) -> u32 {
 }
 
 impl Closed<'_> {
-    /// Takes a row of a closing, past the caches, and tells how many samples have data.
+    /// Takes a row of a closing, past the caches.
     #[inline(always)]
-    fn give<V: Vectors>(&mut self, sense: Sense, to: &mut [f32], from: &[f32], h: &[f32]) -> u32 {
+    fn give<V: Vectors>(&mut self, sense: Sense, to: &mut [f32], from: &[f32], h: &[f32]) {
         let Closed { residual, cut, cl } = self;
         let columns = to.len();
         let first = line(to).min(columns);
         let whole = (columns - first) / LANES * LANES;
         let end = first + whole;
-        let mut samples = 0;
         for i in (0..first).chain(end..columns) {
             let there = !h[i].is_nan();
-            samples += u32::from(there);
             to[i] = if there { sense.give(from[i]) } else { f32::NAN };
             residual[i] = left(to[i], h[i]);
             cl[i] = if there { cut[i] } else { f32::NAN };
@@ -140,7 +138,6 @@ impl Closed<'_> {
         for (((to, residual), cl), ((z, h), cut)) in to.zip(residual).zip(cl).zip(read) {
             let (z, h) = (V::load(z), V::load(h));
             let there = V::at_least(h, lowest);
-            samples += there.count_ones();
             let z_mm = if sense == Sense::Raise { z } else { V::subtract(zero, z) };
             let z_mm = V::choose(V::at_least(z, least) & there, z_mm, none);
             V::stream(z_mm, to);
@@ -154,6 +151,5 @@ impl Closed<'_> {
             }
             if alike[1] { V::stream(cut_mm, cl) } else { V::store(cut_mm, cl) }
         }
-        samples
     }
 }

@@ -148,7 +148,7 @@ fn by_rows<E>(
             let mut to = Outlet::plain(&mut band.cl, part.columns);
             if every == 1 {
                 for ((to, samples), row) in to.iter_mut().zip(&samples).zip(new.row..) {
-                    to.beside = Some(Beside { h: h.rows().row(row), samples, closed: None });
+                    to.beside = Some(Beside { h: h.rows().row(row), samples: Some(samples), closed: None });
                 }
             }
             locations.rows(h.rows(), new.row, to);
@@ -185,7 +185,7 @@ fn closed<'b>(h: Rows<'b>, cut: Rows<'b>, samples: &'b [AtomicU32], band: &'b mu
         .map(|((((to, residual), cl), samples), row)| {
             let cut = &cut.row(row)[beside..][..columns];
             let closed = Some(Closed { residual, cut, cl });
-            Outlet { to, beside: Some(Beside { h: h.row(row), samples, closed }) }
+            Outlet { to, beside: Some(Beside { h: h.row(row), samples: Some(samples), closed }) }
         })
         .collect()
 }
@@ -322,6 +322,29 @@ mod tests {
         let done = by_rows(rows_at_once, lattice, &tables, every, with_closing, read, lift, each);
         assert!(done.is_ok());
         (out, counted)
+    }
+
+    #[test]
+    fn samples_are_counted_once_where_a_search_is_given_up() {
+        for width_mm in [0.83, 21.3] {
+            let mut part = part(width_mm);
+            // Noise from the middle on: the rows below have been given when the search is given up.
+            let half = part.1.z_mm.len() / 2;
+            let mut seed = 7u32;
+            for z_mm in &mut part.1.z_mm[half..] {
+                seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
+                *z_mm = (seed >> 8) as f32 * 1e-7;
+            }
+            let there = part.1.z_mm.iter().filter(|z| !z.is_nan()).count() as u64;
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+            for with_closing in [false, true] {
+                let ([cl, ..], counted) = pool.install(|| streamed_of(&part, 1000, 1, with_closing));
+                assert_eq!(counted, there, "{width_mm} mm, with closing: {with_closing}");
+                assert!(
+                    cl.iter().zip(&part.1.z_mm).all(|(cl, h)| f32::from_bits(*cl).is_nan() == h.is_nan())
+                );
+            }
+        }
     }
 
     #[test]
