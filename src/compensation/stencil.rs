@@ -2,7 +2,7 @@ use super::Profile;
 use super::lanes::{LANES, NONE};
 use super::profile::REACH_MM;
 
-/// No data between two arcs' values, so that groups of lanes may run over the ends of an arc.
+/// No data between the values of two rows, so that groups of lanes may run over the ends of a row.
 const PADDING: usize = 3 * LANES;
 
 /// One row of a stencil: the samples dx in `lo ..= hi` columns from the cutter's axis, of which
@@ -38,6 +38,8 @@ pub(super) struct Stencil {
     pub fx: f64,
     pub fy: f64,
     first: i64,
+    /// From a row's values to those of the next; all else is no data.
+    stride: usize,
     arcs: Vec<Arc>,
     values: Vec<f32>,
     /// More than rounding can shift the difference of two entries, in mm.
@@ -71,13 +73,14 @@ impl Stencil {
         let reach = profile.reach() as i64 + 1;
         let plateau_mm = profile.plateau_mm();
         let mut arcs = Vec::new();
-        let mut values = vec![NONE; PADDING];
+        let columns = 2 * reach as usize + 1;
+        let stride = columns + PADDING;
+        let mut values = vec![NONE; PADDING + columns * stride];
         let mut deepest = 0.0f32;
-        let mut row = Vec::new();
-        for k in -reach..=reach {
+        for (row, k) in (-reach..=reach).enumerate() {
             let dy_mm = (k as f64 + fy) * step_mm;
             let (mut lo, mut hi, mut flat_lo, mut flat_hi) = (1, 0, 1, 0);
-            row.clear();
+            let base = PADDING + row * stride + reach as usize;
             for dx in -reach..=reach {
                 let dx_mm = (dx as f64 + fx) * step_mm;
                 let distance_mm = (dx_mm * dx_mm + dy_mm * dy_mm).sqrt();
@@ -86,7 +89,7 @@ impl Stencil {
                     lo = dx as i32;
                 }
                 hi = dx as i32;
-                row.push(s_mm as f32);
+                values[(base as i64 - dx) as usize] = s_mm as f32;
                 deepest = deepest.min(s_mm as f32);
                 if s_mm == 0.0 && distance_mm <= plateau_mm + REACH_MM {
                     if flat_lo > flat_hi {
@@ -95,22 +98,20 @@ impl Stencil {
                     flat_hi = dx as i32;
                 }
             }
-            let base = (values.len() as i64 + hi as i64) as usize;
-            values.extend(row.iter().rev());
-            values.extend([NONE; PADDING]);
             arcs.push(Arc { lo, hi, flat_lo, flat_hi, base });
         }
-        Stencil { fx, fy, first: -reach, arcs, values, slack_mm: 4.0 * deepest.abs() * f32::EPSILON }
+        Stencil { fx, fy, first: -reach, stride, arcs, values, slack_mm: 4.0 * deepest.abs() * f32::EPSILON }
     }
 
     pub fn bytes(&self) -> usize {
         size_of_val(self.values.as_slice()) + size_of_val(self.arcs.as_slice())
     }
 
-    /// All values, in which arcs stand one after the other.
+    /// All values, where s(0) of the axis' own row stands in them, and how far from a row to the next: s(dx) of row k stands
+    /// at `origin + k stride - dx`, for k as far as one row out of reach and dx as far as 2 LANES.
     #[inline(always)]
-    pub fn values(&self) -> &[f32] {
-        &self.values
+    pub fn values(&self) -> (&[f32], i32, i32) {
+        (&self.values, self.arc_there(0).index(0) as i32, self.stride as i32)
     }
 
     /// The samples k rows above the axis.
