@@ -98,19 +98,10 @@ impl<V: Vectors> Work<V> for Raise<'_, '_> {
         let (mut start, mut left) = (start as usize, groups);
         while left > 0 {
             let now = if left == AT_ONCE + 1 { 2 } else { left.min(AT_ONCE) };
-            match (now, by_sample, on.every == 1) {
-                (1, true, true) => bundle.by_samples::<V, 1, 2>(1, start, out),
-                (2, true, true) => bundle.by_samples::<V, 2, 2>(1, start, out),
-                (_, true, true) => bundle.by_samples::<V, AT_ONCE, 2>(1, start, out),
-                (1, true, false) => bundle.by_samples::<V, 1, 1>(on.every as i32, start, out),
-                (2, true, false) => bundle.by_samples::<V, 2, 1>(on.every as i32, start, out),
-                (_, true, false) => bundle.by_samples::<V, AT_ONCE, 1>(on.every as i32, start, out),
-                (1, false, true) => bundle.by_offsets::<V, 1, 2>(field, on, start, out),
-                (2, false, true) => bundle.by_offsets::<V, 2, 2>(field, on, start, out),
-                (_, false, true) => bundle.by_offsets::<V, AT_ONCE, 2>(field, on, start, out),
-                (1, false, false) => bundle.by_offsets::<V, 1, 1>(field, on, start, out),
-                (2, false, false) => bundle.by_offsets::<V, 2, 1>(field, on, start, out),
-                (_, false, false) => bundle.by_offsets::<V, AT_ONCE, 1>(field, on, start, out),
+            if on.every == 1 {
+                bundle.raise::<V, 2>(field, on, by_sample, [start, now], out);
+            } else {
+                bundle.raise::<V, 1>(field, on, by_sample, [start, now], out);
             }
             start += now * LANES;
             left -= now;
@@ -138,6 +129,26 @@ struct Bundle<'a> {
 }
 
 impl Bundle<'_> {
+    /// Raises so many groups of each target row from `start` on, so many target rows at once.
+    #[inline(always)]
+    fn raise<V: Vectors, const TARGETS: usize>(
+        &self,
+        field: &Field,
+        on: &OnSamples,
+        by_sample: bool,
+        [start, groups]: [usize; 2],
+        out: &mut Targets,
+    ) {
+        match (groups, by_sample) {
+            (1, true) => self.by_samples::<V, 1, TARGETS>(on, start, out),
+            (2, true) => self.by_samples::<V, 2, TARGETS>(on, start, out),
+            (_, true) => self.by_samples::<V, AT_ONCE, TARGETS>(on, start, out),
+            (1, false) => self.by_offsets::<V, 1, TARGETS>(field, on, start, out),
+            (2, false) => self.by_offsets::<V, 2, TARGETS>(field, on, start, out),
+            (_, false) => self.by_offsets::<V, AT_ONCE, TARGETS>(field, on, start, out),
+        }
+    }
+
     /// The target rows that it may raise.
     #[inline(always)]
     fn target_rows(&self, every: i32, rows: usize) -> std::ops::Range<i32> {
@@ -151,9 +162,9 @@ impl Bundle<'_> {
         first..end.min(rows as i32)
     }
 
-    /// So many target rows at once with the groups from `start` on: raises each by the bundle's rows from a first to a last
-    /// one, for which dy is so much more than the row. The processor waits for a maximum before it takes the next of it:
-    /// some of them side by side keep it at work.
+    /// So many target rows at once with the groups from `start` on: each is to be raised by the bundle's rows from a first
+    /// to a last one, at a dy that is so much more than the row. The processor waits for a maximum before it takes the next
+    /// of it: some of them side by side keep it at work.
     #[inline(always)]
     fn targets<V: Vectors, const GROUPS: usize, const TARGETS: usize>(
         &self,
@@ -168,6 +179,7 @@ impl Bundle<'_> {
             // Past the last one it is taken again.
             let b: [i32; TARGETS] = std::array::from_fn(|k| (first + k as i32).min(of.end - 1));
             let level = b.map(|b| self.row - b * every);
+            // Those of either: a row past a target's own lies under the cutter too, or stands in the stencil as no data.
             let rows = [
                 (low - level[0]).max(self.rows[0] as i32),
                 (high - level[TARGETS - 1]).min(self.rows[1] as i32),
@@ -195,11 +207,11 @@ impl Bundle<'_> {
     #[inline(always)]
     fn by_samples<V: Vectors, const GROUPS: usize, const TARGETS: usize>(
         &self,
-        every: i32,
+        on: &OnSamples,
         start: usize,
         out: &mut Targets,
     ) {
-        self.targets::<V, GROUPS, TARGETS>(every, start, out, |best, level, [from, to]| {
+        self.targets::<V, GROUPS, TARGETS>(on.every as i32, start, out, |best, level, [from, to]| {
             let samples = &self.samples[self.ends[from as usize]..self.ends[to as usize + 1]];
             let at = level.map(|level| self.origin + level * self.stride + start as i32);
             for &(z, back) in samples {
