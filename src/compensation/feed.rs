@@ -7,9 +7,6 @@ use super::outlet::Outlet;
 use super::pairs::OnSamples;
 use crate::grid::Window;
 
-/// Bytes of targets that a core's cache may well hold until they are looked at.
-const CACHE: usize = 1 << 20;
-
 /// How far a field was fed: rows taken, and targets given.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fed {
@@ -86,7 +83,7 @@ impl<'a, 'b> Feed<'a, 'b> {
         fed: Fed,
     ) -> Feed<'a, 'b> {
         let level = on.target_row - on.input_row;
-        let is_large = to.iter().map(|row| size_of_val(&*row.to)).sum::<usize>() > CACHE;
+        let is_large = Outlet::are_many(to);
         let (reach, every) = (on.reach, on.every);
         Feed { h, input, sense, reach, every, level, to, first, is_large, fed }
     }

@@ -193,19 +193,19 @@ pub(super) fn higher<V: Vectors>(out: &mut [f32], a: &[f32], b: &[f32]) {
 /// Defines `$name`, which runs the generic function `$body::<V, P>` with the widest vectors that
 /// this processor has.
 macro_rules! widest {
-    ($(#[$doc:meta])* fn $name:ident<$generic:ident: $bound:path>($($arg:ident: $kind:ty),* $(,)?) = $body:ident) => {
+    ($(#[$doc:meta])* fn $name:ident<$($generic:ident: $bound:path)?>($($arg:ident: $kind:ty),* $(,)?) = $body:ident) => {
         $(#[$doc])*
-        pub(super) fn $name<$generic: $bound>($($arg: $kind),*) {
+        pub(super) fn $name<$($generic: $bound)?>($($arg: $kind),*) {
             #[cfg(target_arch = "x86_64")]
             {
                 use $crate::compensation::x86::{Avx2, Avx512};
                 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,lzcnt,popcnt")]
-                fn avx512<$generic: $bound>($($arg: $kind),*) {
-                    $body::<Avx512, $generic>($($arg),*)
+                fn avx512<$($generic: $bound)?>($($arg: $kind),*) {
+                    $body::<Avx512 $(, $generic)?>($($arg),*)
                 }
                 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-                fn avx2<$generic: $bound>($($arg: $kind),*) {
-                    $body::<Avx2, $generic>($($arg),*)
+                fn avx2<$($generic: $bound)?>($($arg: $kind),*) {
+                    $body::<Avx2 $(, $generic)?>($($arg),*)
                 }
                 let with_avx2 = is_x86_feature_detected!("avx2")
                     && is_x86_feature_detected!("bmi1")
@@ -225,7 +225,7 @@ macro_rules! widest {
                     return unsafe { avx2($($arg),*) };
                 }
             }
-            $body::<$crate::compensation::lanes::Portable, $generic>($($arg),*)
+            $body::<$crate::compensation::lanes::Portable $(, $generic)?>($($arg),*)
         }
     };
 }

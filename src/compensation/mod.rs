@@ -31,6 +31,7 @@ mod facets;
 mod feed;
 mod field;
 mod flank;
+mod folded;
 mod held;
 mod interval;
 mod lanes;

@@ -5,6 +5,9 @@ use super::field::{Sense, line};
 use super::lanes::{LANES, LEAST, Portable, Vectors, groups, groups_mut};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+/// Bytes of targets that a core's cache may well hold until they are looked at.
+const CACHE: usize = 1 << 20;
+
 /// Where a row of targets goes.
 pub(super) struct Outlet<'b> {
     pub to: &'b mut [f32],
@@ -33,6 +36,11 @@ impl<'b> Outlet<'b> {
     /// One of each of these rows.
     pub fn plain(z_mm: &'b mut [f32], columns: usize) -> Vec<Outlet<'b>> {
         z_mm.chunks_exact_mut(columns.max(1)).map(|to| Outlet { to, beside: None }).collect()
+    }
+
+    /// Whether these are too many for a core's cache.
+    pub fn are_many(to: &[Outlet<'_>]) -> bool {
+        to.iter().map(|row| size_of_val(&*row.to)).sum::<usize>() > CACHE
     }
 
     /// In pieces of so many columns, from the left.

@@ -60,8 +60,9 @@ pub(super) struct OnSamples<'a> {
 }
 
 impl OnSamples<'_> {
+    /// The row of a target.
     #[inline(always)]
-    fn target(&self, b: usize) -> i64 {
+    pub fn target(&self, b: usize) -> i64 {
         self.target_row + b as i64 * self.every
     }
 }

@@ -57,7 +57,7 @@ pub fn stream<E>(
 
 fn rows_at_once(lattice: &Lattice, tables: &Tables) -> usize {
     let columns = lattice.columns.max(1);
-    if in_strips(tables, columns) {
+    if in_strips(tables, columns, 1) {
         return (STRIP_SAMPLES / columns).clamp(64, 1024);
     }
     (BAND_SAMPLES / columns).clamp(64, 1024)
@@ -355,7 +355,7 @@ mod tests {
         let in_pool = |threads: usize, every: usize, with_closing: bool| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             pool.install(|| {
-                assert_eq!(in_strips(&Tables::new(profile), part.0.columns), threads == 1);
+                assert_eq!(in_strips(&Tables::new(profile), part.0.columns, 1), threads == 1);
                 streamed_of(&part, 50, every, with_closing)
             })
         };

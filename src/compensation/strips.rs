@@ -5,7 +5,7 @@ use super::field::{Field, Sense, Targets};
 use super::held::Rows;
 use super::outlet::Outlet;
 use super::tiles::{Going, OnTile, on_tiles, strip_columns};
-use super::way::{Way, is_searched};
+use super::way::{Way, is_searched_on_samples};
 use crate::grid::Window;
 use rayon::prelude::*;
 
@@ -32,17 +32,17 @@ struct Strip {
     going: Option<Going>,
 }
 
-/// Whether a cutter is taken in strips.
-pub(super) fn in_strips(tables: &Tables, columns: usize) -> bool {
+/// Whether a cutter is taken in strips; if at any distance of rows, then at every row.
+pub(super) fn in_strips(tables: &Tables, columns: usize, every: usize) -> bool {
     let profile = tables.profile();
-    is_searched(profile, Way::Known)
+    is_searched_on_samples(profile, every, Way::Known)
         && profile.reach() <= MOST_REACH
         && columns.div_ceil(strip_columns(columns)) >= 2 * rayon::current_num_threads()
 }
 
 /// Bytes that the strips of a cutter hold, at most.
 pub(super) fn strip_bytes(tables: &Tables, columns: usize) -> u64 {
-    if !in_strips(tables, columns) {
+    if !in_strips(tables, columns, 1) {
         return 0;
     }
     let reach = tables.profile().reach();
@@ -54,7 +54,7 @@ pub(super) fn strip_bytes(tables: &Tables, columns: usize) -> u64 {
 impl<'a> Strips<'a> {
     pub fn new(tables: &'a Tables, all: Window, every: usize, sense: Sense) -> Strips<'a> {
         let columns = all.columns.max(1);
-        let width = if in_strips(tables, columns) { Some(strip_columns(columns)) } else { None };
+        let width = if in_strips(tables, columns, every) { Some(strip_columns(columns)) } else { None };
         Strips::of_width(tables, all, every, sense, width)
     }
 

@@ -8,8 +8,8 @@ use super::outlet::Outlet;
 use super::pairs::OnSamples;
 use super::search::Progress;
 use super::stencil::Stencil;
-use super::way::{Way, has_table, is_searched, without_search};
-use super::{Profile, Tables, brute, contact};
+use super::way::{Way, has_table, is_folded, is_searched_on_samples, without_search};
+use super::{Profile, Tables, contact, folded};
 use crate::grid::{Heights, Window};
 use crate::memory::untouched;
 use rayon::prelude::*;
@@ -29,13 +29,13 @@ const WHOLE_ROWS: usize = 1024;
 /// Cutter locations at the samples of `out`, which may reach past the part: the lowest z of the
 /// cutter's lowest point at which it does not cut into `h`. NaN where no data is in reach.
 pub fn cutter_location(h: &Heights, profile: &Profile, out: Window) -> Heights {
-    on_samples(h, &Tables::new(*profile), out, 1, Sense::Raise, Way::Known)
+    on_samples(h, &Tables::new(*profile), out, 1, Sense::Raise)
 }
 
-/// [`cutter_location`] by one way only, for benches: all give the same bits.
+/// [`cutter_location_rows_into`] by one way only, at every row, for benches: all give the same bits.
 #[doc(hidden)]
-pub fn cutter_location_by(h: &Heights, profile: &Profile, out: Window, way: Way) -> Heights {
-    on_samples(h, &Tables::new(*profile), out, 1, Sense::Raise, way)
+pub fn cutter_location_by(h: &Heights, profile: &Profile, out: Window, way: Way, done: &mut Heights) {
+    on_samples_into(h, &Tables::new(*profile), out, 1, Sense::Raise, way, done);
 }
 
 /// As [`cutter_location`], at the rows `out.row`, `out.row + every`, ... of `out` only: the k-th
@@ -43,7 +43,7 @@ pub fn cutter_location_by(h: &Heights, profile: &Profile, out: Window, way: Way)
 ///
 /// `every` is at least 1.
 pub fn cutter_location_rows(h: &Heights, profile: &Profile, out: Window, every: usize) -> Heights {
-    on_samples(h, &Tables::new(*profile), out, every.max(1), Sense::Raise, Way::Known)
+    on_samples(h, &Tables::new(*profile), out, every.max(1), Sense::Raise)
 }
 
 /// As [`cutter_location_rows`], in the memory that `done` has: taking some anew, and giving it back,
@@ -61,12 +61,12 @@ pub fn cutter_location_rows_into(
 /// What a cutter standing at the locations `cl` (NaN: it does not stand there) leaves of a stock
 /// without top: min over |d| <= R of cl(x + d) - s(d), NaN where no position reaches.
 pub fn erode(cl: &Heights, profile: &Profile, out: Window) -> Heights {
-    on_samples(cl, &Tables::new(*profile), out, 1, Sense::Lower, Way::Known)
+    on_samples(cl, &Tables::new(*profile), out, 1, Sense::Lower)
 }
 
-fn on_samples(h: &Heights, tables: &Tables, out: Window, every: usize, sense: Sense, way: Way) -> Heights {
+fn on_samples(h: &Heights, tables: &Tables, out: Window, every: usize, sense: Sense) -> Heights {
     let mut done = Heights { window: out, z_mm: Vec::new() };
-    on_samples_into(h, tables, out, every, sense, way, &mut done);
+    on_samples_into(h, tables, out, every, sense, Way::Known, &mut done);
     done
 }
 
@@ -169,7 +169,7 @@ impl<'a> OnTile<'a> {
     }
 
     fn dilate(&self, tile: Window, to: &mut [Outlet<'_>], (field, targets): &mut (Field, Targets)) {
-        if is_searched(self.profile, self.way) {
+        if is_searched_on_samples(self.profile, self.every as usize, self.way) {
             let (input, pairs) = self.pairs(tile);
             let mut feed = Feed::new(self.h, input, self.sense, &pairs, to, field, targets);
             let (fed, most) = (Some((&mut feed, &mut Progress::new())), self.most(tile));
@@ -212,6 +212,11 @@ impl<'a> OnTile<'a> {
     }
 
     fn without_search(&self, tile: Window, to: &mut [Outlet<'_>], field: &mut Field, targets: &mut Targets) {
+        if is_folded(self.profile, self.way) {
+            let (input, pairs) = self.pairs(tile);
+            folded::every_sample(self.h, input, self.sense, &pairs, field, to);
+            return;
+        }
         let at_once = WHOLE_ROWS.max(2 * self.profile.reach()).div_ceil(self.every as usize);
         for (k, to) in to.chunks_mut(at_once).enumerate() {
             let row = tile.row + (k * at_once) as i64 * self.every;
@@ -250,11 +255,11 @@ impl<'a> OnTile<'a> {
         (input, pairs)
     }
 
-    /// Work at which looking for contacts is given up.
+    /// Work at which looking for contacts is given up: what it counts takes about twice as long as a sum.
     fn most(&self, tile: Window) -> f64 {
         match self.way {
             Way::Contacts => f64::INFINITY,
-            _ => brute::work(self.profile, tile.columns, tile.rows),
+            _ => 0.5 * folded::work(self.profile, tile.columns, tile.rows),
         }
     }
 }
@@ -268,11 +273,15 @@ pub(super) mod surfaces;
 mod tests {
     use super::super::lanes::{Portable, Vectors};
     use super::super::way::has_chords;
-    use super::super::{bounded, chord};
+    use super::super::{bounded, brute, chord};
     use super::*;
 
-    /// By the definition, by the way that suits the cutter, and by a table.
-    fn bits<V: Vectors>(h: &Heights, cutter: &str) -> [Vec<u32>; 3] {
+    fn bits_of(z_mm: &[f32]) -> Vec<u32> {
+        z_mm.iter().map(|z| z.to_bits()).collect()
+    }
+
+    /// By the definition, by the way that suits the cutter, by a table, and by every sample with as few sums as may be.
+    fn bits<V: Vectors>(h: &Heights, cutter: &str) -> [Vec<u32>; 4] {
         let profile = Profile::new(cutter.parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
         let stencil = Stencil::new(&profile, 0.0, 0.0);
         let window = h.window.grown(5);
@@ -295,7 +304,9 @@ mod tests {
             fill(&mut targets);
             let mut bits = Vec::new();
             for row in 0..window.rows {
-                bits.extend(targets.row(row)[..window.columns].iter().map(|z| z.to_bits()));
+                let mut to = vec![0.0; window.columns];
+                Sense::Raise.give_row(&mut to, targets.row(row));
+                bits.extend(bits_of(&to));
             }
             bits
         };
@@ -323,8 +334,18 @@ mod tests {
                 }
             })
         };
+        let mut folded = Heights { window, z_mm: vec![0.0; window.samples()] };
+        folded::body::<V>(
+            h.into(),
+            input,
+            Sense::Raise,
+            &pairs,
+            &mut Field::empty(0, 0),
+            &mut Outlet::plain(&mut folded.z_mm, window.columns),
+        );
+        let folded = bits_of(&folded.z_mm);
         if profile.is_ball() {
-            return [every_tap.clone(), every_tap, pruned];
+            return [every_tap.clone(), every_tap, pruned, folded];
         }
         let cones = Cones::new(&profile, &stencil, has_chords(&profile));
         let listed = done(&mut |targets| {
@@ -342,7 +363,7 @@ mod tests {
                 contact::body_by_table::<V, _>(field, &pairs, &cones, targets, most, &mut false);
             }
         });
-        [every_tap, pruned, listed]
+        [every_tap, pruned, listed, folded]
     }
 
     #[test]
@@ -359,9 +380,10 @@ mod tests {
                 "vee:120:0:0.8",
             ];
             for cutter in cutters {
-                let [portable, pruned, listed] = bits::<Portable>(h, cutter);
+                let [portable, pruned, listed, folded] = bits::<Portable>(h, cutter);
                 assert!(portable == pruned, "{cutter} on {name}, portable");
                 assert!(portable == listed, "{cutter} on {name}, portable, by a table");
+                assert!(portable == folded, "{cutter} on {name}, portable, by every sample");
                 #[cfg(target_arch = "x86_64")]
                 {
                     use super::super::x86::{Avx2, Avx512};

@@ -3,13 +3,18 @@
 use super::cones::Cones;
 use super::field::{Field, Targets};
 use super::pairs::Pairs;
-use super::{Profile, bounded, brute, chord, contact};
+use super::{Profile, bounded, brute, chord, contact, folded};
 
 /// Radius of a flat bottom, in samples, from which chords are less work than single samples.
 const LEAST_CHORD: f64 = 2.0;
 
 /// Radius of a ball, in samples, from which looking for contacts is less work than every sample.
 const LEAST_SEARCH: f64 = 4.0;
+
+/// Sums by which a position is found by every sample, up to which that is less work than looking for contacts: so many,
+/// and so many more for each row of samples from one row of positions to the next, for a search looks at all of these.
+const FEW_SUMS: f64 = 12.0;
+const FEW_SUMS_A_ROW: f64 = 32.0;
 
 /// Work for a sample, in groups of lanes, from which leaving out by maxima is faster than looking for contacts by a
 /// table, as on surfaces that touch a flat bottom's rim nearly everywhere; and as part of taking every sample, where
@@ -28,8 +33,25 @@ pub enum Way {
 }
 
 /// Whether contacts are looked for.
-pub(super) fn is_searched(profile: &Profile, way: Way) -> bool {
-    profile.is_ball() && profile.radius() >= LEAST_SEARCH && way != Way::EveryTap
+fn is_searched(profile: &Profile) -> bool {
+    profile.is_ball() && profile.radius() >= LEAST_SEARCH
+}
+
+/// The same for positions on samples, in every `every`-th row.
+pub(super) fn is_searched_on_samples(profile: &Profile, every: usize, way: Way) -> bool {
+    let few = FEW_SUMS + FEW_SUMS_A_ROW * every as f64;
+    is_searched(profile)
+        && match way {
+            Way::Known => folded::sums(profile) > few,
+            Way::EveryTap => false,
+            Way::Contacts => true,
+        }
+}
+
+/// Whether positions on samples, where no contacts are looked for, are found by every sample.
+pub(super) fn is_folded(profile: &Profile, way: Way) -> bool {
+    let is_flat = profile.plateau_mm() >= profile.radius_mm();
+    !is_flat && (profile.is_ball() || profile.radius() < bounded::LEAST_RADIUS || way == Way::EveryTap)
 }
 
 /// Whether a flat bottom is taken chord by chord.
@@ -47,7 +69,7 @@ pub(super) fn has_table(profile: &Profile, way: Way) -> bool {
 
 /// Raises the targets by the field, by whichever way suits the profile.
 pub(super) fn dilate<P: Pairs>(field: &mut Field, pairs: &P, profile: &Profile, targets: &mut Targets) {
-    if is_searched(profile, Way::Known) {
+    if is_searched(profile) {
         let most = brute::work(profile, targets.columns, targets.rows);
         let mut given_up = false;
         contact::contacts(field, pairs, profile, targets, None, most, &mut given_up);

@@ -1,0 +1,196 @@
+//! Every sample under every position of a cutter that stands on samples: a fallback whose work does not depend on the
+//! surface, and the way of small cutters.
+//!
+//! The four samples at (+-dx, +-dy) from the axis have one entry of the table, and rounding is monotonic: the sum with
+//! the highest of them is the highest of their sums, to the bit. So samples above and below the axis are taken together
+//! first, then added up column by column, and the columns beside the axis taken together last: a quarter of the sums.
+
+use super::field::{Field, PAD, Sense, TILE, line};
+use super::held::Rows;
+use super::lanes::{LANES, NONE, Vectors, groups, groups_mut, widest};
+use super::outlet::Outlet;
+use super::pairs::OnSamples;
+use super::profile::Profile;
+use super::stencil::Stencil;
+use crate::grid::Window;
+
+/// Columns that are worked on together, at least and at most: the samples in reach stay in the nearest cache.
+const STRIP: [usize; 2] = [256, 2048];
+
+/// The same by the reach of a cutter, both sides of which are worked on besides.
+const STRIP_REACHES: usize = 24;
+
+/// Rows of samples in which targets are worked on strip by strip.
+const BAND: usize = 32;
+
+widest! {
+    /// Gives each row of targets by every sample in its reach, of which `field` holds few more than these.
+    fn every_sample<>(h: Rows<'_>, input: Window, sense: Sense, on: &OnSamples<'_>, field: &mut Field, to: &mut [Outlet<'_>]) = body
+}
+
+#[inline(always)]
+pub(super) fn body<V: Vectors>(
+    h: Rows<'_>,
+    input: Window,
+    sense: Sense,
+    on: &OnSamples<'_>,
+    field: &mut Field,
+    to: &mut [Outlet<'_>],
+) {
+    let Some(first) = to.first() else { return };
+    let columns = first.to.len();
+    let are_many = Outlet::are_many(to);
+    let (reach, every) = (on.reach, on.every as usize);
+    let at_once = BAND.div_ceil(every);
+    field.hold(input, 2 * reach as usize + (at_once - 1) * every + 1);
+    let mut fold = Fold::new(on.stencil, reach as usize, columns);
+    let stride = columns.next_multiple_of(TILE) + TILE;
+    let mut rows = vec![NONE; at_once * stride];
+    let mut taken = -1;
+    for (band, to) in to.chunks_mut(at_once).enumerate() {
+        let first = on.target(band * at_once) - on.input_row;
+        let last = first + ((to.len() - 1) * every) as i64;
+        for a in (first - reach).max(taken)..=last + reach {
+            field.take(a, h, input, sense);
+        }
+        taken = last + reach + 1;
+        // The field's column under the left end of the cutter at the first target.
+        let left = (on.shift - reach) as usize;
+        for strip in (0..columns).step_by(fold.strip) {
+            for (k, row) in rows.chunks_exact_mut(stride).take(to.len()).enumerate() {
+                let columns = fold.strip.min(columns - strip);
+                fold.row::<V>(field, first + (k * every) as i64, left + strip, columns, &mut row[strip..]);
+            }
+        }
+        for (to, row) in to.iter_mut().zip(rows.chunks_exact(stride)) {
+            to.give::<V>(sense, row, are_many);
+        }
+    }
+    V::streamed();
+}
+
+/// Sums, and what else takes as long, by which [`every_sample`] finds a position.
+pub(super) fn sums(profile: &Profile) -> f64 {
+    let radius = profile.radius();
+    std::f64::consts::FRAC_PI_4 * radius * radius + 2.5 * radius + 1.0
+}
+
+/// Groups of lanes that it takes for so many targets.
+pub(super) fn work(profile: &Profile, columns: usize, rows: usize) -> f64 {
+    sums(profile) * rows as f64 * columns.div_ceil(LANES) as f64
+}
+
+/// [`TILE`] columns, from a cache line on.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Pair([[f32; LANES]; TILE / LANES]);
+
+/// A strip of a row of targets, and what is worked out on the way.
+struct Fold<'a> {
+    stencil: &'a Stencil,
+    reach: usize,
+    /// Columns of targets in a strip.
+    strip: usize,
+    /// The higher of the samples dy above and below the axis.
+    pairs: Vec<Pair>,
+    /// By dx, the highest of these with s(dx, dy) added.
+    sums: Vec<f32>,
+    /// From one dx to the next.
+    stride: usize,
+}
+
+impl Fold<'_> {
+    fn new(stencil: &Stencil, reach: usize, columns: usize) -> Fold<'_> {
+        let strip = (STRIP_REACHES * reach).clamp(STRIP[0], STRIP[1]).min(columns).next_multiple_of(TILE);
+        let stride = (strip + 2 * reach + LANES).next_multiple_of(TILE) + TILE;
+        let pairs = vec![Pair([[NONE; LANES]; TILE / LANES]); reach + 1];
+        Fold { stencil, reach, strip, pairs, sums: vec![NONE; (reach + 1) * stride + LANES], stride }
+    }
+
+    /// Targets whose axes stand in row `centre` of the field, the cutter's left end from column `left` on.
+    #[inline(always)]
+    fn row<V: Vectors>(&mut self, field: &Field, centre: i64, left: usize, columns: usize, to: &mut [f32]) {
+        let (reach, stride) = (self.reach, self.stride);
+        let origin = line(&self.sums);
+        // All is worked out from a cache line on.
+        let (start, beside) = (PAD + left / LANES * LANES, left % LANES);
+        for tile in (0..columns + 2 * reach + beside).step_by(TILE) {
+            let i = start + tile;
+            for (pair, dy) in self.pairs.iter_mut().zip(0..) {
+                let [below, above] = [-dy, dy].map(|dy| groups(&field.row(centre + dy)[i..][..TILE]));
+                for ((pair, below), above) in pair.0.iter_mut().zip(below).zip(above) {
+                    V::store(V::greater(V::load(below), V::load(above)), pair);
+                }
+            }
+            for (dx, sums) in self.sums[origin..].chunks_exact_mut(stride).enumerate() {
+                let mut best = [V::splat(NONE); TILE / LANES];
+                if let Some(arc) = self.stencil.arc(dx as i64) {
+                    let s = &arc.values[arc.index(arc.arc.hi)..=arc.index(0)];
+                    for (pair, s) in self.pairs.iter().zip(s.iter().rev()) {
+                        let s = V::splat(*s);
+                        for (best, pair) in best.iter_mut().zip(&pair.0) {
+                            *best = V::greater(*best, V::add(V::load(pair), s));
+                        }
+                    }
+                }
+                for (to, best) in groups_mut(&mut sums[tile..][..TILE]).iter_mut().zip(best) {
+                    V::store(best, to);
+                }
+            }
+        }
+        let sums = &self.sums[origin + beside..];
+        for tile in (0..columns).step_by(TILE) {
+            let at = |dx: usize, i: usize| groups(&sums[dx * stride + tile + i..][..TILE]);
+            let mut best = [V::splat(NONE); TILE / LANES];
+            for (best, sum) in best.iter_mut().zip(at(0, reach)) {
+                *best = V::load(sum);
+            }
+            for dx in 1..=reach {
+                let both = at(dx, reach - dx).iter().zip(at(dx, reach + dx));
+                for (best, (left, right)) in best.iter_mut().zip(both) {
+                    *best = V::greater(*best, V::greater(V::load(left), V::load(right)));
+                }
+            }
+            for (to, best) in groups_mut(&mut to[tile..][..TILE]).iter_mut().zip(best) {
+                V::store(best, to);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::brute;
+    use super::super::field::Targets;
+    use super::super::tiles::{OnTile, surfaces};
+    use super::super::{Tables, Way};
+    use super::*;
+
+    #[test]
+    fn strips_and_bands_meet_and_rows_between_are_left_out() {
+        let mut random = surfaces::Random(11);
+        let noise = |_, _| if random.next() < 0.01 { f64::NAN } else { 90.0 * random.next() };
+        let h = surfaces::from(700, 150, noise);
+        for (cutter, every) in [("ball:0.2", 1), ("ball:0.5", 3), ("vee:60:0:0.12", 7), ("ball:0.1", 40)] {
+            let tables =
+                Tables::new(Profile::new(cutter.parse().expect("a cutter"), 0.01, 0.0).expect("a profile"));
+            for sense in [Sense::Raise, Sense::Lower] {
+                let of = OnTile::new((&h).into(), &tables, every, sense, Way::EveryTap);
+                let out = h.window.grown(4);
+                let rows = out.rows.div_ceil(every);
+                let (input, pairs) = of.pairs(Window { rows, ..out });
+                let [mut folded, mut by_definition] = [0.0, 1.0].map(|z| vec![z; rows * out.columns]);
+                let mut to = Outlet::plain(&mut folded, out.columns);
+                every_sample((&h).into(), input, sense, &pairs, &mut Field::empty(0, 0), &mut to);
+                let mut targets = Targets::new(out.columns, rows);
+                let field = Field::of((&h).into(), input, sense);
+                brute::every_tap(&field, &pairs, false, &mut targets);
+                for (row, to) in Outlet::plain(&mut by_definition, out.columns).iter_mut().enumerate() {
+                    to.give_portable(sense, targets.row(row));
+                }
+                let bits = |z_mm: &[f32]| z_mm.iter().map(|z| z.to_bits()).collect::<Vec<_>>();
+                assert!(bits(&folded) == bits(&by_definition), "{cutter}, every {every}, {sense:?}");
+            }
+        }
+    }
+}
