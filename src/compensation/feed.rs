@@ -3,15 +3,17 @@ use super::blocks::ROWS;
 use super::field::{Field, Sense, Targets};
 use super::held::Rows;
 use super::lanes::Vectors;
-use super::outlet::Outlet;
+use super::outlet::{Outlet, with_data};
 use super::pairs::OnSamples;
 use crate::grid::Window;
 
 /// How far a field was fed: rows taken, and targets given.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Fed {
     taken: i64,
     given: usize,
+    /// Samples with data at the targets in rows that were taken and not given yet, where they are counted; they go round.
+    samples: Vec<u32>,
 }
 
 /// Samples that will be taken soon: reading them from memory goes on beside the search.
@@ -43,13 +45,16 @@ pub(super) struct Feed<'a, 'b> {
     sense: Sense,
     reach: i64,
     every: i64,
-    /// Row of the field at whose height target 0 stands.
+    /// Row and column of the field at which target 0 stands.
     level: i64,
+    column: i64,
     /// Where those from `first` on go.
     to: &'a mut [Outlet<'b>],
     first: usize,
     /// Whether they are too many for a core's cache.
     is_large: bool,
+    /// Whether samples are counted as they are taken, while they are in the nearest cache.
+    is_counted: bool,
     pub fed: Fed,
 }
 
@@ -68,7 +73,8 @@ impl<'a, 'b> Feed<'a, 'b> {
         field.hold(input, ROWS + 2 * far);
         let columns = to.first().map_or(0, |row| row.to.len());
         targets.hold(columns, on.target_rows, (ROWS + 2 * on.reach as usize) / on.every as usize + 2);
-        let fed = Fed { taken: -1, given: 0 };
+        let held = (2 * (on.reach as usize + ROWS + far)).next_power_of_two();
+        let fed = Fed { taken: -1, given: 0, samples: vec![0; held] };
         Feed::again(h, input, sense, on, to, 0, fed)
     }
 
@@ -84,8 +90,9 @@ impl<'a, 'b> Feed<'a, 'b> {
     ) -> Feed<'a, 'b> {
         let level = on.target_row - on.input_row;
         let is_large = Outlet::are_many(to);
-        let (reach, every) = (on.reach, on.every);
-        Feed { h, input, sense, reach, every, level, to, first, is_large, fed }
+        let (reach, every, column) = (on.reach, on.every, on.shift);
+        let is_counted = to.first().is_some_and(Outlet::counts_samples);
+        Feed { h, input, sense, reach, every, level, column, to, first, is_large, is_counted, fed }
     }
 
     /// Whether all targets that are wanted are given.
@@ -101,13 +108,29 @@ impl<'a, 'b> Feed<'a, 'b> {
 
     /// Takes the samples that these rows of the field are looked at with.
     #[inline(always)]
-    pub fn before(&mut self, a: i64, rows: usize, field: &mut Field) {
+    pub fn before<V: Vectors>(&mut self, a: i64, rows: usize, field: &mut Field) {
         let far = FARTHEST.min(self.reach as usize) as i64 + 1;
         let end = a + rows as i64;
         while self.fed.taken < end + far && self.fed.taken <= self.input.rows as i64 {
             field.take(self.fed.taken, self.h, self.input, self.sense);
+            if self.is_counted {
+                let place = self.fed.taken as usize & (self.fed.samples.len() - 1);
+                self.fed.samples[place] = self.count::<V>(self.fed.taken);
+            }
             self.fed.taken += 1;
         }
+    }
+
+    /// Samples with data at the targets in a row of the field.
+    #[inline(always)]
+    fn count<V: Vectors>(&self, row: i64) -> u32 {
+        let columns = self.to.first().map_or(0, |to| to.to.len());
+        let at =
+            Window { column: self.input.column + self.column, row: self.input.row + row, columns, rows: 1 };
+        self.h.window.intersection(&at).map_or(0, |at| {
+            let first = (at.column - self.h.window.column) as usize;
+            with_data::<V>(&self.h.row(at.row)[first..][..at.columns])
+        })
     }
 
     /// The rows that [`Feed::before`] takes next.
@@ -141,6 +164,10 @@ impl<'a, 'b> Feed<'a, 'b> {
     fn give<V: Vectors>(&mut self, targets: &mut Targets) {
         targets.open(self.fed.given + 1);
         let row = &mut self.to[self.fed.given - self.first];
+        if self.is_counted {
+            let at = self.level + self.fed.given as i64 * self.every;
+            row.counted(self.fed.samples[at as usize & (self.fed.samples.len() - 1)]);
+        }
         row.give::<V>(self.sense, targets.row(self.fed.given), self.is_large);
         targets.close();
         self.fed.given += 1;

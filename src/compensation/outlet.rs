@@ -61,6 +61,19 @@ impl<'b> Outlet<'b> {
         })
     }
 
+    /// Whether samples are counted and nothing else is looked at beside.
+    pub fn counts_samples(&self) -> bool {
+        self.beside.as_ref().is_some_and(|beside| beside.samples.is_some() && beside.closed.is_none())
+    }
+
+    /// Takes how many samples have data.
+    #[inline(always)]
+    pub fn counted(&mut self, count: u32) {
+        if let Some(samples) = self.beside.as_mut().and_then(|beside| beside.samples.take()) {
+            samples.fetch_add(count, Ordering::Relaxed);
+        }
+    }
+
     /// Takes a row of targets; past the caches, if they are many.
     #[inline(always)]
     pub fn give<V: Vectors>(&mut self, sense: Sense, from: &[f32], are_many: bool) {
@@ -107,7 +120,7 @@ impl<'b> Beside<'b> {
 
 /// How many samples have data.
 #[inline(always)]
-fn with_data<V: Vectors>(h: &[f32]) -> u32 {
+pub(super) fn with_data<V: Vectors>(h: &[f32]) -> u32 {
     let lowest = V::splat(f32::NEG_INFINITY);
     let mut samples = 0;
     let whole = groups(h);

@@ -69,7 +69,7 @@ pub(super) fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
         let part = (((a + count - start) as f64 - lead) / (end - 2.0 * lead)).clamp(0.0, 1.0);
         search.most = (part + ALLOWANCE) * most;
         if let Some(feed) = &mut feed {
-            feed.before(a as i64, count, search.field);
+            feed.before::<V>(a as i64, count, search.field);
         }
         let ahead = feed.as_ref().map(|feed| feed.ahead());
         search.rows(a as i64, count, ahead, out);
