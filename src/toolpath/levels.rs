@@ -11,15 +11,15 @@ pub(super) type Profile = Vec<[i32; 2]>;
 pub(super) fn cuts(profile: &[[i32; 2]], above: i32, level: i32) -> Vec<Profile> {
     let mut out = Vec::new();
     let mut run: Profile = Vec::new();
-    let lifted = |u: i32, z: f64| [u, (z.ceil() as i32).max(level)];
+    let lifted = |u: i32, z: i32| [u, z.max(level)];
     for pair in profile.windows(2) {
         let (a, b) = (pair[0], pair[1]);
         if run.is_empty() {
             if a[1] < above {
-                run.push(lifted(a[0], f64::from(a[1])));
+                run.push(lifted(a[0], a[1]));
             } else if b[1] < above {
                 let u = crossing(a, b, above);
-                run.push(lifted(u, height(a, b, u)));
+                run.push(lifted(u, whole_height(a, b, u)));
             } else {
                 continue;
             }
@@ -30,10 +30,10 @@ pub(super) fn cuts(profile: &[[i32; 2]], above: i32, level: i32) -> Vec<Profile>
             push(&mut run, [u, level]);
         }
         if b[1] < above {
-            push(&mut run, lifted(b[0], f64::from(b[1])));
+            push(&mut run, lifted(b[0], b[1]));
         } else {
             let u = crossing(a, b, above);
-            push(&mut run, lifted(u, height(a, b, u)));
+            push(&mut run, lifted(u, whole_height(a, b, u)));
             close(&mut out, &mut run);
         }
     }
@@ -86,6 +86,12 @@ fn height(a: [i32; 2], b: [i32; 2], u: i32) -> f64 {
     f64::from(a[1]) + t * (f64::from(b[1]) - f64::from(a[1]))
 }
 
+/// The same in whole units, up: a height that is whole stays what it is.
+fn whole_height(a: [i32; 2], b: [i32; 2], u: i32) -> i32 {
+    let [run, rise] = [0, 1].map(|k| i64::from(b[k]) - i64::from(a[k]));
+    (i64::from(a[1]) - (-rise * (i64::from(u) - i64::from(a[0]))).div_euclid(run)) as i32
+}
+
 /// Grid place where the segment a b passes a height, on the side where it is lower.
 fn crossing(a: [i32; 2], b: [i32; 2], z: i32) -> i32 {
     let rise = i64::from(b[1]) - i64::from(a[1]);
@@ -109,6 +115,12 @@ mod tests {
         assert_eq!(cuts(&profile, 10, -40), vec![vec![[0, 10], [50, -40], [150, -40], [200, 10]]]);
         assert_eq!(cuts(&profile, -40, -100), vec![vec![[50, -40], [100, -90], [150, -40]]]);
         assert!(cuts(&profile, -90, -150).is_empty());
+    }
+
+    #[test]
+    fn a_cut_that_starts_at_the_level_above_is_no_higher() {
+        let cut = vec![[14, -13], [15, -14], [24, -14]];
+        assert_eq!(cuts(&[[1, 104], [24, -103]], -13, -14), vec![cut]);
     }
 
     proptest! {
