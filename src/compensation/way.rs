@@ -8,7 +8,7 @@ use super::{Profile, bounded, brute, chord, contact, folded};
 /// Radius of a flat bottom, in samples, from which chords are less work than single samples.
 const LEAST_CHORD: f64 = 2.0;
 
-/// Radius of a ball, in samples, from which looking for contacts is less work than every sample.
+/// Radius of a ball, in samples, from which looking for contacts is less work than every sample with a sum of its own.
 const LEAST_SEARCH: f64 = 4.0;
 
 /// Sums by which a position is found by every sample, up to which that is less work than looking for contacts: so many,
@@ -48,10 +48,15 @@ pub(super) fn is_searched_on_samples(profile: &Profile, every: usize, way: Way) 
         }
 }
 
-/// Whether positions on samples, where no contacts are looked for, are found by every sample.
+/// Whether positions on samples, where no contacts are looked for, are found by sums that samples share.
 pub(super) fn is_folded(profile: &Profile, way: Way) -> bool {
-    let is_flat = profile.plateau_mm() >= profile.radius_mm();
-    !is_flat && (profile.is_ball() || profile.radius() < bounded::LEAST_RADIUS || way == Way::EveryTap)
+    profile.plateau_mm() < profile.radius_mm() && leaves_nothing_out(profile, way)
+}
+
+/// Whether every sample is taken where no contacts are looked for. Where looking for a ball's is too much work, maxima
+/// leave nothing out either.
+fn leaves_nothing_out(profile: &Profile, way: Way) -> bool {
+    profile.is_ball() || profile.radius() < bounded::LEAST_RADIUS || way == Way::EveryTap
 }
 
 /// Whether a flat bottom is taken chord by chord.
@@ -110,8 +115,7 @@ pub(super) fn without_search<P: Pairs>(
             return;
         }
     }
-    // Where looking for a ball's contacts is too much work, maxima leave nothing out either.
-    if profile.is_ball() || profile.radius() < bounded::LEAST_RADIUS || way == Way::EveryTap {
+    if leaves_nothing_out(profile, way) {
         brute::every_tap(field, pairs, chords, targets);
     } else {
         bounded::bounded(field, pairs, chords, targets);
