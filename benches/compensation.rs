@@ -7,7 +7,7 @@
 mod surfaces;
 
 use npyz::WriterBuilder;
-use screenmill::compensation::{self, Band, Closings, Profile, RowTarget, Tables, Way};
+use screenmill::compensation::{self, Band, Closings, Profile, RowTarget, Tables, Wanted, Way};
 use screenmill::grid::{Heights, Lattice, Window};
 use std::hint::black_box;
 use std::path::Path;
@@ -287,7 +287,11 @@ fn two_threads(h: &Heights) {
 fn whole_part(h: &Heights) {
     let (profile, lattice) = (ball(100), Lattice::covering(200.0, 200.0, STEP_MM));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool of threads");
-    for with_closing in [false, true] {
+    let cl = Wanted { cl: true, ..Wanted::default() };
+    let closing = Wanted { closing: true, ..Wanted::default() };
+    let all = Wanted { cl: true, closing: true, residual: true, out_of_reach: true };
+    for (wanted, what) in [(cl, "locations"), (closing, "closing"), (all, "locations, closing and residual")]
+    {
         let took: Vec<String> = (0..5)
             .map(|_| {
                 let (start, mut reading) = (Instant::now(), Duration::ZERO);
@@ -306,13 +310,12 @@ fn whole_part(h: &Heights) {
                     Ok(())
                 };
                 let done = pool.install(|| {
-                    compensation::stream(&lattice, &profile, 1, with_closing, read, |_, _| Ok(()), each)
+                    compensation::stream(&lattice, &profile, 1, wanted, read, |_, _| Ok(()), each)
                 });
                 done.expect("nothing that could fail");
                 format!("{:.2}", (start.elapsed() - reading).as_secs_f64())
             })
             .collect();
-        let what = if with_closing { "locations and closing" } else { "locations" };
         println!("20 x 20 cm, {what}, R = 100, two threads: {} s, wall time", took.join(", "));
     }
 }

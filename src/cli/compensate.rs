@@ -5,7 +5,7 @@ use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use screenmill::compensation::{self, Band, Profile};
+use screenmill::compensation::{self, Band, Profile, Wanted};
 use screenmill::cutter::Shape;
 use screenmill::grid::{Lattice, Window};
 use screenmill::pipeline;
@@ -15,12 +15,6 @@ use serde_json::json;
 
 use super::part::Part;
 use super::{Common, Outcome, Refusal, console};
-
-/// A residual above this is a cavity and not rounding.
-const CAVITY_MM: f32 = 1e-5;
-
-/// Samples that are looked at together.
-const LANES: usize = 16;
 
 /// Writes the locations of a cutter over a part, and what it can and cannot reach
 #[derive(clap::Args, Clone, Debug)]
@@ -68,11 +62,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let lattice = surface.lattice();
     let profile = Profile::new(arguments.cutter, lattice.step_mm, 0.0)?;
     let exact = kind != Kind::Heights && !arguments.sampled;
-    let with_closing = arguments.closing.is_some() || arguments.residual.is_some() || arguments.cl.is_none();
-    if with_closing {
+    let [cl, closing, residual] =
+        [&arguments.cl, &arguments.closing, &arguments.residual].map(|path| path.is_some());
+    let wanted = Wanted { cl, closing, residual, out_of_reach: !cl };
+    if wanted.closes() {
         profile.covers_between(every)?;
     }
-    let needed = compensation::stream_bytes(&lattice, &profile, with_closing);
+    let needed = compensation::stream_bytes(&lattice, &profile, every, wanted);
     if let Some(there) = free_bytes().filter(|there| needed > *there) {
         return Err(compensation::Error::Memory {
             columns: lattice.columns,
@@ -87,7 +83,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     if let Ok(style) = ProgressStyle::with_template("compensate {wide_bar} {pos}/{len} rows {eta}") {
         progress.set_style(style);
     }
-    let work = Work { surface: surface.as_ref(), lattice, profile, every, with_closing, exact };
+    let work = Work { surface: surface.as_ref(), lattice, profile, every, wanted, exact };
     let (files, found, times) = work.stream(files, &progress)?;
     if common.verbose {
         times.tell();
@@ -99,7 +95,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Outcome, Refusal> {
     let names = files.finish()?;
     let Lattice { columns, rows, step_mm, .. } = lattice;
     let cutter = arguments.cutter.to_string();
-    let residual = with_closing.then(|| {
+    let residual = wanted.closes().then(|| {
         let area_mm2 = found.cavity_samples as f64 * step_mm * step_mm;
         let fraction = found.cavity_samples as f64 / found.samples as f64;
         (f64::from(found.residual_max_mm), area_mm2, fraction)
@@ -144,7 +140,7 @@ struct Work<'a> {
     lattice: Lattice,
     profile: Profile,
     every: usize,
-    with_closing: bool,
+    wanted: Wanted,
     /// Whether locations are lifted to the exact drop on the part's faces.
     exact: bool,
 }
@@ -176,7 +172,7 @@ impl Work<'_> {
                 &self.lattice,
                 &self.profile,
                 self.every,
-                self.with_closing,
+                self.wanted,
                 |window, z_mm| {
                     if console::interrupted() {
                         return Err(Stop::Refused(pipeline::Error::Interrupted.into()));
@@ -267,18 +263,8 @@ struct Found {
 impl Found {
     fn see(&mut self, band: &Band) {
         self.samples += band.samples;
-        for some in band.residual.chunks(1 << 16) {
-            let mut most = [self.residual_max_mm; LANES];
-            let mut cavities = 0;
-            for part in some.chunks(LANES) {
-                for (most, &z) in most.iter_mut().zip(part) {
-                    *most = if z > *most { z } else { *most };
-                    cavities += u32::from(z > CAVITY_MM);
-                }
-            }
-            self.residual_max_mm = most.into_iter().fold(0.0, f32::max);
-            self.cavity_samples += u64::from(cavities);
-        }
+        self.residual_max_mm = self.residual_max_mm.max(band.out_of_reach.most_mm);
+        self.cavity_samples += band.out_of_reach.samples;
     }
 }
 

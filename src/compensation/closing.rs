@@ -7,6 +7,9 @@ use super::way::Way;
 use super::{Profile, Tables};
 use crate::grid::{Heights, Window};
 
+/// What a closing leaves on a sample, in mm, from which that is out of the cutter's reach: more than rounding leaves.
+pub const CAVITY_MM: f32 = 1e-5;
+
 /// Closings one after the other, in memory that is kept from each to the next: memory taken anew, and given back,
 /// costs about as much as what is done to a sample under a small cutter.
 #[derive(Debug)]

@@ -71,7 +71,7 @@ impl<'a, 'b> Feed<'a, 'b> {
     ) -> Feed<'a, 'b> {
         let far = FARTHEST.min(on.reach as usize) + 1;
         field.hold(input, ROWS + 2 * far);
-        let columns = to.first().map_or(0, |row| row.to.len());
+        let columns = to.first().map_or(0, Outlet::columns);
         targets.hold(columns, on.target_rows, (ROWS + 2 * on.reach as usize) / on.every as usize + 2);
         let held = (2 * (on.reach as usize + ROWS + far)).next_power_of_two();
         let fed = Fed { taken: -1, given: 0, samples: vec![0; held] };
@@ -124,7 +124,7 @@ impl<'a, 'b> Feed<'a, 'b> {
     /// Samples with data at the targets in a row of the field.
     #[inline(always)]
     fn count<V: Vectors>(&self, row: i64) -> u32 {
-        let columns = self.to.first().map_or(0, |to| to.to.len());
+        let columns = self.to.first().map_or(0, Outlet::columns);
         let at =
             Window { column: self.input.column + self.column, row: self.input.row + row, columns, rows: 1 };
         self.h.window.intersection(&at).map_or(0, |at| {

@@ -38,7 +38,7 @@ pub(super) fn body<V: Vectors>(
     to: &mut [Outlet<'_>],
 ) {
     let Some(first) = to.first() else { return };
-    let columns = first.to.len();
+    let columns = first.columns();
     let are_many = Outlet::are_many(to);
     let (reach, every) = (on.reach, on.every as usize);
     let at_once = BAND.div_ceil(every);

@@ -62,14 +62,14 @@ mod weld;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub use closing::{Closings, closing, residual};
+pub use closing::{CAVITY_MM, Closings, closing, residual};
 pub use drop::{Faces, lift};
 pub use facets::Facets;
 pub use marked::Marked;
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows, rows_by};
 pub use places::Places;
 pub use profile::Profile;
-pub use stream::{Band, stream, stream_bytes};
+pub use stream::{Band, OutOfReach, Wanted, stream, stream_bytes};
 pub use tables::Tables;
 #[doc(hidden)]
 pub use tiles::cutter_location_by;

@@ -1,6 +1,6 @@
 //! Where targets go, and what is made of them on the way: what was just worked out is still in a core's cache.
 
-use super::closing::left;
+use super::closing::{CAVITY_MM, left};
 use super::field::{Sense, line};
 use super::lanes::{LANES, LEAST, Portable, Vectors, groups, groups_mut};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -10,6 +10,7 @@ const CACHE: usize = 1 << 20;
 
 /// Where a row of targets goes.
 pub(super) struct Outlet<'b> {
+    /// Nowhere, if it is empty and something is made of them beside.
     pub to: &'b mut [f32],
     pub beside: Option<Beside<'b>>,
 }
@@ -18,18 +19,58 @@ pub(super) struct Outlet<'b> {
 pub(super) struct Beside<'b> {
     /// The part's samples there.
     pub h: &'b [f32],
-    /// Where those with data are counted, until they are: a search that is given up has given some rows already.
-    pub samples: Option<&'b AtomicU32>,
+    /// Where that is told in numbers, until it is: a search that is given up has given some rows already.
+    pub tally: Option<&'b RowTally>,
     /// What is made of a closing.
     pub closed: Option<Closed<'b>>,
 }
 
-/// What goes with a closing, which is no data where the part has none.
+/// What goes with a closing, which is no data where the part has none. Either may be empty: it is not wanted.
 pub(super) struct Closed<'b> {
     pub residual: &'b mut [f32],
     /// Cutter locations, and where they go: no data where the part has none.
     pub cut: &'b [f32],
     pub cl: &'b mut [f32],
+}
+
+/// What several threads find out about one row.
+#[derive(Debug, Default)]
+pub(super) struct RowTally {
+    samples: AtomicU32,
+    cavities: AtomicU32,
+    /// Bits of a height, which are ordered as heights that are not negative are.
+    most_mm: AtomicU32,
+}
+
+/// A row, or a part of one, in numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Tally {
+    /// Samples with data, and those of them that a closing leaves more than [`CAVITY_MM`] on.
+    pub samples: u32,
+    pub cavities: u32,
+    /// The most that is left on one.
+    pub most_mm: f32,
+}
+
+impl RowTally {
+    #[inline(always)]
+    fn add(&self, tally: Tally) {
+        self.samples.fetch_add(tally.samples, Ordering::Relaxed);
+        if tally.cavities > 0 {
+            self.cavities.fetch_add(tally.cavities, Ordering::Relaxed);
+        }
+        self.most_mm.fetch_max(tally.most_mm.to_bits(), Ordering::Relaxed);
+    }
+
+    /// What was found out since this was last asked.
+    pub fn take(&mut self) -> Tally {
+        let RowTally { samples, cavities, most_mm } = std::mem::take(self);
+        Tally {
+            samples: samples.into_inner(),
+            cavities: cavities.into_inner(),
+            most_mm: f32::from_bits(most_mm.into_inner()),
+        }
+    }
 }
 
 impl<'b> Outlet<'b> {
@@ -40,18 +81,25 @@ impl<'b> Outlet<'b> {
 
     /// Whether these are too many for a core's cache.
     pub fn are_many(to: &[Outlet<'_>]) -> bool {
-        to.iter().map(|row| size_of_val(&*row.to)).sum::<usize>() > CACHE
+        to.iter().map(|row| size_of::<f32>() * row.columns()).sum::<usize>() > CACHE
+    }
+
+    /// How many targets it takes.
+    #[inline(always)]
+    pub fn columns(&self) -> usize {
+        self.beside.as_ref().map_or(self.to.len(), |beside| beside.h.len())
     }
 
     /// In pieces of so many columns, from the left.
     pub fn split(self, columns: usize) -> impl Iterator<Item = Outlet<'b>> {
         let mut left = Some(self);
         std::iter::from_fn(move || {
-            let Outlet { to, beside } = left.take()?;
-            if to.len() <= columns {
-                return Some(Outlet { to, beside });
+            let outlet = left.take()?;
+            if outlet.columns() <= columns {
+                return Some(outlet);
             }
-            let (to, more) = to.split_at_mut(columns);
+            let Outlet { to, beside } = outlet;
+            let (to, more) = split_mut(to, columns);
             let [beside, more_beside] = match beside {
                 Some(beside) => beside.split(columns).map(Some),
                 None => [None, None],
@@ -63,26 +111,30 @@ impl<'b> Outlet<'b> {
 
     /// Whether samples are counted and nothing else is looked at beside.
     pub fn counts_samples(&self) -> bool {
-        self.beside.as_ref().is_some_and(|beside| beside.samples.is_some() && beside.closed.is_none())
+        self.beside.as_ref().is_some_and(|beside| beside.tally.is_some() && beside.closed.is_none())
     }
 
     /// Takes how many samples have data.
     #[inline(always)]
-    pub fn counted(&mut self, count: u32) {
-        if let Some(samples) = self.beside.as_mut().and_then(|beside| beside.samples.take()) {
-            samples.fetch_add(count, Ordering::Relaxed);
+    pub fn counted(&mut self, samples: u32) {
+        if let Some(tally) = self.beside.as_mut().and_then(|beside| beside.tally.take()) {
+            tally.add(Tally { samples, ..Tally::default() });
         }
     }
 
     /// Takes a row of targets; past the caches, if they are many.
     #[inline(always)]
     pub fn give<V: Vectors>(&mut self, sense: Sense, from: &[f32], are_many: bool) {
-        if let Some(Beside { h, samples, closed }) = &mut self.beside {
-            if let Some(samples) = samples.take() {
-                samples.fetch_add(with_data::<V>(h), Ordering::Relaxed);
+        if let Some(Beside { h, tally, closed }) = &mut self.beside {
+            let found = match closed {
+                Some(closed) => closed.give::<V>(sense, self.to, from, h),
+                None if tally.is_some() => Tally { samples: with_data::<V>(h), ..Tally::default() },
+                None => Tally::default(),
+            };
+            if let Some(tally) = tally.take() {
+                tally.add(found);
             }
-            if let Some(closed) = closed {
-                closed.give::<V>(sense, self.to, from, h);
+            if closed.is_some() {
                 return;
             }
         }
@@ -101,12 +153,12 @@ impl<'b> Outlet<'b> {
 
 impl<'b> Beside<'b> {
     fn split(self, columns: usize) -> [Beside<'b>; 2] {
-        let Beside { h, samples, closed } = self;
+        let Beside { h, tally, closed } = self;
         let h = h.split_at(columns);
         let [closed, more_closed] = match closed {
             Some(Closed { residual, cut, cl }) => {
                 let (residual, cut, cl) =
-                    (residual.split_at_mut(columns), cut.split_at(columns), cl.split_at_mut(columns));
+                    (split_mut(residual, columns), cut.split_at(columns), split_mut(cl, columns));
                 [
                     Some(Closed { residual: residual.0, cut: cut.0, cl: cl.0 }),
                     Some(Closed { residual: residual.1, cut: cut.1, cl: cl.1 }),
@@ -114,8 +166,13 @@ impl<'b> Beside<'b> {
             }
             None => [None, None],
         };
-        [Beside { h: h.0, samples, closed }, Beside { h: h.1, samples, closed: more_closed }]
+        [Beside { h: h.0, tally, closed }, Beside { h: h.1, tally, closed: more_closed }]
     }
+}
+
+/// The first columns of a row and the others; of one that is not wanted, neither.
+fn split_mut(z_mm: &mut [f32], columns: usize) -> (&mut [f32], &mut [f32]) {
+    z_mm.split_at_mut(columns.min(z_mm.len()))
 }
 
 /// How many samples have data.
@@ -136,41 +193,72 @@ pub(super) fn with_data<V: Vectors>(h: &[f32]) -> u32 {
 impl Closed<'_> {
     /// Takes a row of a closing, past the caches.
     #[inline(always)]
-    fn give<V: Vectors>(&mut self, sense: Sense, to: &mut [f32], from: &[f32], h: &[f32]) {
+    fn give<V: Vectors>(&mut self, sense: Sense, to: &mut [f32], from: &[f32], h: &[f32]) -> Tally {
         let Closed { residual, cut, cl } = self;
-        let columns = to.len();
-        let first = line(to).min(columns);
-        let whole = (columns - first) / LANES * LANES;
-        let end = first + whole;
+        let mut tally = Tally::default();
+        let columns = h.len();
+        // As far as the first cache line of one of these that is wanted.
+        let first =
+            [&*to, &**residual, &**cl].into_iter().find(|z| !z.is_empty()).map_or(0, line).min(columns);
+        let end = first + (columns - first) / LANES * LANES;
         for i in (0..first).chain(end..columns) {
             let there = !h[i].is_nan();
-            to[i] = if there { sense.give(from[i]) } else { f32::NAN };
-            residual[i] = left(to[i], h[i]);
-            cl[i] = if there { cut[i] } else { f32::NAN };
+            let z_mm = if there { sense.give(from[i]) } else { f32::NAN };
+            let left_mm = left(z_mm, h[i]);
+            tally.samples += u32::from(there);
+            tally.cavities += u32::from(left_mm > CAVITY_MM);
+            tally.most_mm = if left_mm > tally.most_mm { left_mm } else { tally.most_mm };
+            let made = [z_mm, left_mm, if there { cut[i] } else { f32::NAN }];
+            for (to, made) in [&mut *to, &mut **residual, &mut **cl].into_iter().zip(made) {
+                if let Some(to) = to.get_mut(i) {
+                    *to = made;
+                }
+            }
         }
-        // They begin their cache lines together, or else are stored as ever.
-        let alike = [&**residual, &**cl].map(|z| line(&z[first..]) == 0);
+        let mut wanted =
+            [Filled::of(to, first..end), Filled::of(residual, first..end), Filled::of(cl, first..end)];
         let (zero, none, least) = (V::splat(0.0), V::splat(f32::NAN), V::splat(LEAST));
-        let lowest = V::splat(f32::NEG_INFINITY);
-        let to = groups_mut(&mut to[first..end]).iter_mut();
-        let residual = groups_mut(&mut residual[first..end]).iter_mut();
-        let cl = groups_mut(&mut cl[first..end]).iter_mut();
+        let (lowest, cavity) = (V::splat(f32::NEG_INFINITY), V::splat(CAVITY_MM.next_up()));
+        let mut most = zero;
         let read = groups(&from[first..end]).iter().zip(groups(&h[first..end])).zip(groups(&cut[first..end]));
-        for (((to, residual), cl), ((z, h), cut)) in to.zip(residual).zip(cl).zip(read) {
+        for (g, ((z, h), cut)) in read.enumerate() {
             let (z, h) = (V::load(z), V::load(h));
             let there = V::at_least(h, lowest);
             let z_mm = if sense == Sense::Raise { z } else { V::subtract(zero, z) };
             let z_mm = V::choose(V::at_least(z, least) & there, z_mm, none);
-            V::stream(z_mm, to);
             let left_mm = V::subtract(z_mm, h);
             let left_mm = V::choose(V::at_least(zero, left_mm), zero, left_mm);
-            let cut_mm = V::choose(there, V::load(cut), none);
-            if alike[0] {
-                V::stream(left_mm, residual)
-            } else {
-                V::store(left_mm, residual)
-            }
-            if alike[1] { V::stream(cut_mm, cl) } else { V::store(cut_mm, cl) }
+            tally.samples += there.count_ones();
+            tally.cavities += V::at_least(left_mm, cavity).count_ones();
+            most = V::greater(left_mm, most);
+            let [to, residual, cl] = &mut wanted;
+            to.put::<V>(g, || z_mm);
+            residual.put::<V>(g, || left_mm);
+            cl.put::<V>(g, || V::choose(there, V::load(cut), none));
+        }
+        tally.most_mm = tally.most_mm.max(V::most(most));
+        tally
+    }
+}
+
+/// Whole groups of a row that something is put into, if it is wanted.
+struct Filled<'a> {
+    groups: &'a mut [[f32; LANES]],
+    /// Whether they begin cache lines, and so can go past the caches.
+    is_aligned: bool,
+}
+
+impl<'a> Filled<'a> {
+    #[inline(always)]
+    fn of(z_mm: &'a mut [f32], columns: std::ops::Range<usize>) -> Filled<'a> {
+        let z_mm = if z_mm.is_empty() { z_mm } else { &mut z_mm[columns] };
+        Filled { is_aligned: line(z_mm) == 0, groups: groups_mut(z_mm) }
+    }
+
+    #[inline(always)]
+    fn put<V: Vectors>(&mut self, g: usize, made: impl FnOnce() -> V::Group) {
+        if let Some(to) = self.groups.get_mut(g) {
+            if self.is_aligned { V::stream(made(), to) } else { V::store(made(), to) }
         }
     }
 }

@@ -1,13 +1,12 @@
-use super::closing::left;
+use super::closing::{CAVITY_MM, left};
 use super::field::Sense;
 use super::held::{Held, Rows};
-use super::outlet::{Beside, Closed, Outlet};
+use super::outlet::{Beside, Closed, Outlet, RowTally, Tally};
 use super::strips::{AHEAD, Strips, in_strips, strip_bytes};
 use super::{Profile, RowPass, Tables, machined_by_rows};
 use crate::grid::{Lattice, Window};
 use crate::memory::untouched;
 use rayon::prelude::*;
-use std::sync::atomic::AtomicU32;
 
 /// Samples of one band, about: what is held at once is a few bands and the cutter's reach.
 const BAND_SAMPLES: usize = 1 << 24;
@@ -18,6 +17,35 @@ const STRIP_SAMPLES: usize = 1 << 23;
 /// Rows that one thread masks at once.
 const ROWS: usize = 16;
 
+/// What is to be made of a part, one of these at least; what is not wanted is not written to memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Cutter locations.
+    pub cl: bool,
+    /// What the cutter leaves.
+    pub closing: bool,
+    /// closing less part.
+    pub residual: bool,
+    /// What is out of the cutter's reach, in numbers: [`Band::out_of_reach`]. Comes with the two before, too.
+    pub out_of_reach: bool,
+}
+
+impl Wanted {
+    /// Whether it takes a closing.
+    pub fn closes(&self) -> bool {
+        self.closing || self.residual || self.out_of_reach
+    }
+}
+
+/// What a cutter leaves on a part.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OutOfReach {
+    /// The most on one sample, in mm.
+    pub most_mm: f32,
+    /// Samples with more than [`CAVITY_MM`].
+    pub samples: u64,
+}
+
 /// Rows of one band of a whole part, and what a cutter makes of them.
 #[derive(Clone, Debug, Default)]
 pub struct Band {
@@ -26,11 +54,12 @@ pub struct Band {
     pub rows: usize,
     /// Samples of these rows with data.
     pub samples: u64,
-    /// Cutter locations at the rows of this band that are cut; no data where the part has none.
+    pub out_of_reach: OutOfReach,
+    /// Cutter locations at the rows of this band that are cut, if they are wanted; no data where the part has none.
     pub cl: Vec<f32>,
-    /// What the cutter leaves, if it was asked for; no data where the part has none.
+    /// What the cutter leaves, if it is wanted; no data where the part has none.
     pub closing: Vec<f32>,
-    /// closing less part, if it was asked for.
+    /// closing less part, if it is wanted.
     pub residual: Vec<f32>,
 }
 
@@ -46,13 +75,13 @@ pub fn stream<E>(
     lattice: &Lattice,
     profile: &Profile,
     every: usize,
-    with_closing: bool,
+    wanted: Wanted,
     read: impl FnMut(Window, &mut [f32]) -> Result<(), E>,
     lift: impl FnMut(Window, &mut [f32]) -> Result<(), E>,
     each: impl FnMut(&mut Band) -> Result<(), E>,
 ) -> Result<(), E> {
     let tables = Tables::new(*profile);
-    by_rows(rows_at_once(lattice, &tables), lattice, &tables, every, with_closing, read, lift, each)
+    by_rows(rows_at_once(lattice, &tables), lattice, &tables, every, wanted, read, lift, each)
 }
 
 fn rows_at_once(lattice: &Lattice, tables: &Tables) -> usize {
@@ -65,14 +94,18 @@ fn rows_at_once(lattice: &Lattice, tables: &Tables) -> usize {
 
 /// Bytes that [`stream`] holds at once, about and rather more: by the width of the part and the
 /// cutter, whatever the part's height.
-pub fn stream_bytes(lattice: &Lattice, profile: &Profile, with_closing: bool) -> u64 {
+pub fn stream_bytes(lattice: &Lattice, profile: &Profile, every: usize, wanted: Wanted) -> u64 {
     let tables = Tables::new(*profile);
     let rows = rows_at_once(lattice, &tables).min(lattice.rows);
     let reach = profile.reach();
+    let with_closing = wanted.closes();
     let halo = if with_closing { reach } else { 0 };
     let width = lattice.columns + 2 * halo;
     // The part and the rows cut, with what lies around them, and two bands of results with what a file takes of one.
-    let results = if with_closing { 3 } else { 1 };
+    // Under rows that are not all cut a closing is looked at once more.
+    let closed = with_closing && every > 1;
+    let results = [wanted.cl, wanted.closing || closed, wanted.residual || closed];
+    let results = results.into_iter().filter(|result| *result).count();
     let held = most_rows(rows, reach, halo);
     let held =
         held[0].min(lattice.rows) + if with_closing { held[1].min(lattice.rows + 2 * halo) } else { 0 };
@@ -87,12 +120,13 @@ fn by_rows<E>(
     lattice: &Lattice,
     tables: &Tables,
     every: usize,
-    with_closing: bool,
+    wanted: Wanted,
     mut read: impl FnMut(Window, &mut [f32]) -> Result<(), E>,
     mut lift: impl FnMut(Window, &mut [f32]) -> Result<(), E>,
     mut each: impl FnMut(&mut Band) -> Result<(), E>,
 ) -> Result<(), E> {
     let every = every.max(1);
+    let with_closing = wanted.closes();
     let reach = tables.profile().reach();
     let part = lattice.window();
     let halo = if with_closing { reach } else { 0 };
@@ -109,7 +143,7 @@ fn by_rows<E>(
     let mut locations = Strips::new(tables, all, every, Sense::Raise);
     let mut closings = Strips::new(tables, part, 1, Sense::Lower);
     let mut band = Band::default();
-    let mut samples = Vec::new();
+    let mut tallies = Vec::new();
     for row in (0..part.rows).step_by(rows_at_once) {
         (band.row, band.rows) = (row, rows_at_once.min(part.rows - row));
         let end = (row + band.rows) as i64;
@@ -122,8 +156,7 @@ fn by_rows<E>(
                 read(window, z_mm)?;
             }
         }
-        samples.resize_with(band.rows, AtomicU32::default);
-        samples.iter_mut().for_each(|samples| *samples.get_mut() = 0);
+        tallies.resize_with(band.rows, RowTally::default);
         if with_closing {
             let rows = ((cut_end - 1).div_euclid(every as i64) + 1 - cut.end()).max(0) as usize;
             let mut new = cut.more(rows);
@@ -136,9 +169,15 @@ fn by_rows<E>(
                 }
             }
             if every == 1 {
-                closings.rows(cut.rows(), row as i64, closed(h.rows(), cut.rows(), &samples, &mut band));
+                closings.rows(
+                    cut.rows(),
+                    row as i64,
+                    closed(h.rows(), cut.rows(), &tallies, wanted, &mut band),
+                );
             } else {
-                of_part(cut.rows(), every, &part, &mut band);
+                if wanted.cl {
+                    of_part(cut.rows(), every, &part, &mut band);
+                }
                 under_rows(cut.rows(), every, lattice, tables.profile(), &mut band);
             }
         } else {
@@ -147,14 +186,14 @@ fn by_rows<E>(
             untouched(&mut band.cl, new.samples());
             let mut to = Outlet::plain(&mut band.cl, part.columns);
             if every == 1 {
-                for ((to, samples), row) in to.iter_mut().zip(&samples).zip(new.row..) {
-                    to.beside = Some(Beside { h: h.rows().row(row), samples: Some(samples), closed: None });
+                for ((to, tally), row) in to.iter_mut().zip(&tallies).zip(new.row..) {
+                    to.beside = Some(Beside { h: h.rows().row(row), tally: Some(tally), closed: None });
                 }
             }
             locations.rows(h.rows(), new.row, to);
             lift(new, &mut band.cl)?;
         }
-        finish(h.rows(), every, with_closing, &mut samples, &mut band);
+        finish(h.rows(), every, wanted, &mut tallies, &mut band);
         each(&mut band)?;
 
         // The next band looks at the rows within reach of its first.
@@ -171,23 +210,29 @@ fn most_rows(band: usize, reach: usize, halo: usize) -> [usize; 2] {
 }
 
 /// Where the closings of a band go, what they leave, and the locations within the part.
-fn closed<'b>(h: Rows<'b>, cut: Rows<'b>, samples: &'b [AtomicU32], band: &'b mut Band) -> Vec<Outlet<'b>> {
+fn closed<'b>(
+    h: Rows<'b>,
+    cut: Rows<'b>,
+    tallies: &'b [RowTally],
+    wanted: Wanted,
+    band: &'b mut Band,
+) -> Vec<Outlet<'b>> {
     let columns = h.window.columns;
     let Band { row, rows, cl, closing, residual, .. } = band;
-    for z_mm in [&mut *cl, &mut *closing, &mut *residual] {
-        untouched(z_mm, *rows * columns);
-    }
     let beside = (h.window.column - cut.window.column) as usize;
-    let rows = closing.chunks_exact_mut(columns).zip(residual.chunks_exact_mut(columns));
-    rows.zip(cl.chunks_exact_mut(columns))
-        .zip(samples)
-        .zip(*row as i64..)
-        .map(|((((to, residual), cl), samples), row)| {
-            let cut = &cut.row(row)[beside..][..columns];
-            let closed = Some(Closed { residual, cut, cl });
-            Outlet { to, beside: Some(Beside { h: h.row(row), samples: Some(samples), closed }) }
-        })
-        .collect()
+    let mut rows_of =
+        [(cl, wanted.cl), (closing, wanted.closing), (residual, wanted.residual)].map(|(z_mm, wanted)| {
+            untouched(z_mm, if wanted { *rows * columns } else { 0 });
+            z_mm.chunks_exact_mut(columns)
+        });
+    let rows = tallies.iter().zip(*row as i64..);
+    rows.map(|(tally, row)| {
+        let [cl, to, residual] = rows_of.each_mut().map(|rows| rows.next().unwrap_or_default());
+        let cut = &cut.row(row)[beside..][..columns];
+        let closed = Some(Closed { residual, cut, cl });
+        Outlet { to, beside: Some(Beside { h: h.row(row), tally: Some(tally), closed }) }
+    })
+    .collect()
 }
 
 /// The locations at the band's rows that are cut, over the part's columns.
@@ -219,23 +264,40 @@ fn under_rows(cut: Rows<'_>, every: usize, lattice: &Lattice, profile: &Profile,
 
 /// No data where the part has none, what is left, and how many samples there are, as far as it is not found out on the
 /// way: rows that are cut `every` samples apart do not come by all samples.
-fn finish(h: Rows<'_>, every: usize, with_closing: bool, of_rows: &mut [AtomicU32], band: &mut Band) {
+fn finish(h: Rows<'_>, every: usize, wanted: Wanted, tallies: &mut [RowTally], band: &mut Band) {
     let columns = h.window.columns;
-    let Band { row, rows, samples, cl, closing, residual } = band;
-    let first = *row;
+    let first = band.row;
     let row_of = |k: usize| h.row((first + k) as i64);
-    if every > 1 {
-        of_rows.par_iter_mut().enumerate().with_min_len(ROWS).for_each(|(k, samples)| {
-            *samples.get_mut() = row_of(k).iter().map(|z| u32::from(!z.is_nan())).sum();
+    let mut of_rows: Vec<Tally> = tallies.iter_mut().map(RowTally::take).collect();
+    if every > 1 && wanted.closes() {
+        untouched(&mut band.residual, band.rows * columns);
+        let rows =
+            band.closing.par_chunks_exact_mut(columns).zip(band.residual.par_chunks_exact_mut(columns));
+        rows.zip(&mut of_rows).enumerate().with_min_len(ROWS).for_each(
+            |(k, ((closing, residual), tally))| {
+                *tally = close(closing, residual, row_of(k));
+            },
+        );
+        for (z_mm, wanted) in [(&mut band.closing, wanted.closing), (&mut band.residual, wanted.residual)] {
+            if !wanted {
+                z_mm.clear();
+            }
+        }
+    } else if every > 1 {
+        of_rows.par_iter_mut().enumerate().with_min_len(ROWS).for_each(|(k, tally)| {
+            tally.samples = row_of(k).iter().map(|z| u32::from(!z.is_nan())).sum();
         });
     }
-    let of_rows: Vec<u32> = of_rows.iter_mut().map(|samples| *samples.get_mut()).collect();
-    *samples = of_rows.iter().map(|&samples| u64::from(samples)).sum();
-    if every == 1 && with_closing {
+    band.samples = of_rows.iter().map(|tally| u64::from(tally.samples)).sum();
+    band.out_of_reach = OutOfReach {
+        most_mm: of_rows.iter().fold(0.0, |most, tally| most.max(tally.most_mm)),
+        samples: of_rows.iter().map(|tally| u64::from(tally.cavities)).sum(),
+    };
+    if every == 1 && wanted.closes() {
         return;
     }
-    let is_whole = |k: usize| of_rows[k] as usize == columns;
-    cl.par_chunks_mut(ROWS * columns).enumerate().for_each(|(chunk, cl)| {
+    let is_whole = |k: usize| of_rows[k].samples as usize == columns;
+    band.cl.par_chunks_mut(ROWS * columns).enumerate().for_each(|(chunk, cl)| {
         for (k, cl) in cl.chunks_exact_mut(columns).enumerate() {
             let k = (chunk * ROWS + k) * every;
             if !is_whole(k) {
@@ -243,24 +305,20 @@ fn finish(h: Rows<'_>, every: usize, with_closing: bool, of_rows: &mut [AtomicU3
             }
         }
     });
-    if !with_closing {
-        return;
+}
+
+/// Masks a row of a closing, and makes and tells what is left of the part.
+fn close(closing: &mut [f32], residual: &mut [f32], h: &[f32]) -> Tally {
+    let mut tally = Tally::default();
+    for ((closing, residual), h) in closing.iter_mut().zip(residual).zip(h) {
+        *closing = if h.is_nan() { f32::NAN } else { *closing };
+        let left_mm = left(*closing, *h);
+        *residual = left_mm;
+        tally.samples += u32::from(!h.is_nan());
+        tally.cavities += u32::from(left_mm > CAVITY_MM);
+        tally.most_mm = if left_mm > tally.most_mm { left_mm } else { tally.most_mm };
     }
-    untouched(residual, *rows * columns);
-    let chunks = closing.par_chunks_mut(ROWS * columns).zip(residual.par_chunks_mut(ROWS * columns));
-    chunks.enumerate().for_each(|(chunk, (closing, residual))| {
-        let rows = closing.chunks_exact_mut(columns).zip(residual.chunks_exact_mut(columns));
-        for (k, (closing, residual)) in rows.enumerate() {
-            let k = chunk * ROWS + k;
-            let h = row_of(k);
-            if !is_whole(k) {
-                mask(closing, h);
-            }
-            for ((residual, closing), h) in residual.iter_mut().zip(closing.iter()).zip(h) {
-                *residual = left(*closing, *h);
-            }
-        }
-    });
+    tally
 }
 
 /// No data where the part has none.
@@ -290,24 +348,29 @@ mod tests {
         (lattice, h)
     }
 
+    const CL: Wanted = Wanted { cl: true, closing: false, residual: false, out_of_reach: false };
+    const ALL: Wanted = Wanted { cl: true, closing: true, residual: true, out_of_reach: true };
+
     /// Bits of every band put together: locations, closing, residual.
     fn streamed(rows_at_once: usize, every: usize) -> [Vec<u32>; 3] {
-        streamed_of(&part(0.83), rows_at_once, every, true).0
+        streamed_of(&part(0.83), rows_at_once, every, ALL).0
     }
 
-    /// The same, and how many samples were counted.
+    /// The same, and what was found out in numbers: samples, and what is out of reach.
     fn streamed_of(
         (lattice, h): &(Lattice, Heights),
         rows_at_once: usize,
         every: usize,
-        with_closing: bool,
-    ) -> ([Vec<u32>; 3], u64) {
+        wanted: Wanted,
+    ) -> ([Vec<u32>; 3], (u64, OutOfReach)) {
         let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
         let mut out = [Vec::new(), Vec::new(), Vec::new()];
-        let mut counted = 0;
+        let mut found = (0, OutOfReach::default());
         let each = |band: &mut Band| {
-            let Band { cl, closing, residual, samples, .. } = std::mem::take(band);
-            counted += samples;
+            let Band { cl, closing, residual, samples, out_of_reach, .. } = std::mem::take(band);
+            found.0 += samples;
+            found.1.samples += out_of_reach.samples;
+            found.1.most_mm = out_of_reach.most_mm.max(found.1.most_mm);
             for (out, z_mm) in out.iter_mut().zip([cl, closing, residual]) {
                 out.extend(z_mm.iter().map(|z| z.to_bits()));
             }
@@ -319,9 +382,9 @@ mod tests {
         };
         let tables = Tables::new(profile);
         let lift = |_, _: &mut [f32]| Ok(());
-        let done = by_rows(rows_at_once, lattice, &tables, every, with_closing, read, lift, each);
+        let done = by_rows(rows_at_once, lattice, &tables, every, wanted, read, lift, each);
         assert!(done.is_ok());
-        (out, counted)
+        (out, found)
     }
 
     #[test]
@@ -337,9 +400,9 @@ mod tests {
             }
             let there = part.1.z_mm.iter().filter(|z| !z.is_nan()).count() as u64;
             let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-            for with_closing in [false, true] {
-                let ([cl, ..], counted) = pool.install(|| streamed_of(&part, 1000, 1, with_closing));
-                assert_eq!(counted, there, "{width_mm} mm, with closing: {with_closing}");
+            for wanted in [CL, ALL] {
+                let ([cl, ..], (counted, _)) = pool.install(|| streamed_of(&part, 1000, 1, wanted));
+                assert_eq!(counted, there, "{width_mm} mm, {wanted:?}");
                 assert!(
                     cl.iter().zip(&part.1.z_mm).all(|(cl, h)| f32::from_bits(*cl).is_nan() == h.is_nan())
                 );
@@ -352,19 +415,17 @@ mod tests {
         let part = part(21.3);
         let there = part.1.z_mm.iter().filter(|z| !z.is_nan()).count() as u64;
         let profile = Profile::new("ball:0.3".parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
-        let in_pool = |threads: usize, every: usize, with_closing: bool| {
+        let in_pool = |threads: usize, every: usize, wanted: Wanted| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             pool.install(|| {
                 assert_eq!(in_strips(&Tables::new(profile), part.0.columns, 1), threads == 1);
-                streamed_of(&part, 50, every, with_closing)
+                streamed_of(&part, 50, every, wanted)
             })
         };
-        for (every, with_closing) in [(1, false), (1, true), (3, false), (3, true)] {
-            let (strips, counted) = in_pool(1, every, with_closing);
-            assert_eq!(counted, there);
-            let (tiles, counted) = in_pool(4, every, with_closing);
-            assert_eq!(counted, there);
-            assert!(strips == tiles, "every {every}, with closing: {with_closing}");
+        for (every, wanted) in [(1, CL), (1, ALL), (3, CL), (3, ALL)] {
+            let (strips, found) = in_pool(1, every, wanted);
+            assert_eq!(found.0, there);
+            assert!(in_pool(4, every, wanted) == (strips.clone(), found), "every {every}, {wanted:?}");
             let whole = cutter_location_rows(&part.1, &profile, part.1.window, every);
             for ((k, cl), whole) in strips[0].iter().enumerate().zip(&whole.z_mm) {
                 let (row, column) = (k / part.0.columns * every, k % part.0.columns);
@@ -372,7 +433,29 @@ mod tests {
                 assert_eq!(f32::from_bits(*cl).is_nan(), !is_there);
                 assert!(!is_there || *cl == whole.to_bits());
             }
-            assert_eq!(strips[1].len(), if with_closing { part.1.z_mm.len() } else { 0 });
+            assert_eq!(strips[1].len(), if wanted.closing { part.1.z_mm.len() } else { 0 });
+        }
+    }
+
+    #[test]
+    fn what_is_wanted_is_the_same_whatever_else_is() {
+        for (width_mm, every) in [(0.83, 1), (21.3, 1), (0.83, 3)] {
+            let part = part(width_mm);
+            let (all, found) = streamed_of(&part, 50, every, ALL);
+            let left =
+                || all[2].iter().map(|bits| f32::from_bits(*bits)).filter(|left_mm| *left_mm > CAVITY_MM);
+            assert_eq!(found.1.samples, left().count() as u64);
+            assert_eq!(found.1.most_mm, left().fold(0.0, f32::max));
+            assert!(found.1.samples > 0, "the waves are narrower than the ball");
+            for k in 1..16 {
+                let [cl, closing, residual, out_of_reach] = [1, 2, 4, 8].map(|bit| k & bit != 0);
+                let wanted = Wanted { cl, closing, residual, out_of_reach };
+                let (some, numbers) = streamed_of(&part, 50, every, wanted);
+                for ((some, all), wanted) in some.iter().zip(&all).zip([cl, closing, residual]) {
+                    assert!(if wanted { some == all } else { some.is_empty() }, "{wanted:?}");
+                }
+                assert_eq!(numbers, if wanted.closes() { found } else { (found.0, OutOfReach::default()) });
+            }
         }
     }
 

@@ -96,7 +96,7 @@ impl<'a> Strips<'a> {
         let strips = self.strips.par_iter_mut().with_max_len(1).zip(of_strips).enumerate();
         strips.for_each(|(k, (strip, mut to))| {
             let column = out.column + (k * width) as i64;
-            let tile = Window { column, row, columns: to[0].to.len(), rows };
+            let tile = Window { column, row, columns: to[0].columns(), rows };
             of.go_on(tile, end, &mut to, &mut strip.scratch, &mut strip.going);
         });
     }

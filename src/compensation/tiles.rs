@@ -125,7 +125,7 @@ pub(super) fn on_tiles(
         let tile = Window {
             column: out.column + (k % across * width) as i64,
             row: out.row + (k / across * tile_rows * every) as i64,
-            columns: to[0].to.len(),
+            columns: to[0].columns(),
             rows: to.len(),
         };
         of.dilate(tile, &mut to, scratch);
