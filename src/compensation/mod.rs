@@ -21,6 +21,7 @@ mod bounded;
 mod boxes;
 mod brute;
 mod bundle;
+mod chains;
 mod chord;
 mod closing;
 mod cones;

@@ -1,4 +1,5 @@
 use super::ball::Reachable;
+use super::chains::on_chains;
 use super::cones::Cones;
 use super::feed::{Fed, Feed};
 use super::field::{Field, Sense, Targets};
@@ -20,7 +21,7 @@ const TILE_COLUMNS: usize = 2048;
 /// Reach of a cutter, in samples, up to which the rows of tiles twice as wide stay there, too.
 const SMALL_REACH: usize = 16;
 
-/// Rows of one tile, at least and at most; a tile reads twice the cutter's reach more.
+/// Rows of one tile without a search, at least and at most; a tile reads twice the cutter's reach more.
 const TILE_ROWS: [usize; 2] = [128, 4096];
 
 /// Rows that are held at once where they are not fed.
@@ -87,7 +88,7 @@ pub(super) fn on_samples_into(
     on_tiles(h.into(), tables, out, every, sense, way, to);
 }
 
-/// Work on the samples of `out`, every `every`-th row, tile by tile.
+/// Work on the samples of `out`, every `every`-th row: by a search strip by strip, or else tile by tile.
 pub(super) fn on_tiles(
     h: Rows<'_>,
     tables: &Tables,
@@ -107,6 +108,10 @@ pub(super) fn on_tiles(
     } else {
         strip_columns(columns)
     };
+    let of = OnTile::new(h, tables, every, sense, way);
+    if is_searched_on_samples(profile, every, way) {
+        return on_chains(&of, out, every, profile.reach(), width, to);
+    }
     let across = columns.div_ceil(width);
     let least = TILE_ROWS[0].max(4 * profile.reach());
     let share = (out.rows * across).div_ceil(2 * rayon::current_num_threads());
@@ -119,7 +124,6 @@ pub(super) fn on_tiles(
             tiles[row / tile_rows * across + column].push(to);
         }
     }
-    let of = OnTile::new(h, tables, every, sense, way);
     let scratch = || (Field::empty(0, 0), Targets::new(0, 0));
     tiles.into_par_iter().with_max_len(1).enumerate().for_each_init(scratch, |scratch, (k, mut to)| {
         let tile = Window {
@@ -128,7 +132,7 @@ pub(super) fn on_tiles(
             columns: to[0].columns(),
             rows: to.len(),
         };
-        of.dilate(tile, &mut to, scratch);
+        of.without_search(tile, &mut to, scratch);
     });
 }
 
@@ -168,29 +172,16 @@ impl<'a> OnTile<'a> {
         OnTile { h, profile, stencil: tables.on_samples(), cones, every: every as i64, sense, way }
     }
 
-    fn dilate(&self, tile: Window, to: &mut [Outlet<'_>], (field, targets): &mut (Field, Targets)) {
-        if is_searched_on_samples(self.profile, self.every as usize, self.way) {
-            let (input, pairs) = self.pairs(tile);
-            let mut feed = Feed::new(self.h, input, self.sense, &pairs, to, field, targets);
-            let (fed, most) = (Some((&mut feed, &mut Progress::new())), self.most(tile));
-            let mut given_up = false;
-            contact::contacts(field, &pairs, self.profile, targets, fed, most, &mut given_up);
-            if !given_up {
-                return;
-            }
-        }
-        self.without_search(tile, to, field, targets);
-    }
-
-    /// As [`OnTile::dilate`] with a search that goes on upwards where it stopped, at most up to the row `end`.
+    /// Does a tile by a search that goes on upwards where it stopped, at most up to the row `end`.
     pub fn go_on(
         &self,
         tile: Window,
         end: i64,
         to: &mut [Outlet<'_>],
-        (field, targets): &mut (Field, Targets),
+        scratch: &mut (Field, Targets),
         going: &mut Option<Going>,
     ) {
+        let (field, targets) = scratch;
         let row = going.as_ref().map_or(tile.row, |going| going.row);
         let rows = ((end - row) as usize).div_ceil(self.every as usize);
         let (input, pairs) = self.pairs(Window { row, rows, ..tile });
@@ -205,13 +196,13 @@ impl<'a> OnTile<'a> {
         let fed = Some((&mut feed, &mut progress));
         contact::contacts(field, &pairs, self.profile, targets, fed, self.most(tile), &mut given_up);
         if given_up {
-            self.without_search(tile, to, field, targets);
+            self.without_search(tile, to, scratch);
         } else {
             *going = Some(Going { row, fed: feed.fed, progress });
         }
     }
 
-    fn without_search(&self, tile: Window, to: &mut [Outlet<'_>], field: &mut Field, targets: &mut Targets) {
+    fn without_search(&self, tile: Window, to: &mut [Outlet<'_>], (field, targets): &mut (Field, Targets)) {
         if is_folded(self.profile, self.way) {
             let (input, pairs) = self.pairs(tile);
             folded::every_sample(self.h, input, self.sense, &pairs, field, to);
