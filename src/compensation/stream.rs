@@ -11,7 +11,7 @@ use rayon::prelude::*;
 /// Samples of one band, about: what is held at once is a few bands and the cutter's reach.
 const BAND_SAMPLES: usize = 1 << 24;
 
-/// The same where no row is looked at twice.
+/// The same for closings where no row is looked at twice.
 const STRIP_SAMPLES: usize = 1 << 23;
 
 /// Rows that one thread masks at once.
@@ -81,12 +81,12 @@ pub fn stream<E>(
     each: impl FnMut(&mut Band) -> Result<(), E>,
 ) -> Result<(), E> {
     let tables = Tables::new(*profile);
-    by_rows(rows_at_once(lattice, &tables), lattice, &tables, every, wanted, read, lift, each)
+    by_rows(rows_at_once(lattice, &tables, wanted), lattice, &tables, every, wanted, read, lift, each)
 }
 
-fn rows_at_once(lattice: &Lattice, tables: &Tables) -> usize {
+fn rows_at_once(lattice: &Lattice, tables: &Tables, wanted: Wanted) -> usize {
     let columns = lattice.columns.max(1);
-    if in_strips(tables, columns, 1) {
+    if in_strips(tables, columns, 1) && wanted.closes() {
         return (STRIP_SAMPLES / columns).clamp(64, 1024);
     }
     (BAND_SAMPLES / columns).clamp(64, 1024)
@@ -96,7 +96,7 @@ fn rows_at_once(lattice: &Lattice, tables: &Tables) -> usize {
 /// cutter, whatever the part's height.
 pub fn stream_bytes(lattice: &Lattice, profile: &Profile, every: usize, wanted: Wanted) -> u64 {
     let tables = Tables::new(*profile);
-    let rows = rows_at_once(lattice, &tables).min(lattice.rows);
+    let rows = rows_at_once(lattice, &tables, wanted).min(lattice.rows);
     let reach = profile.reach();
     let with_closing = wanted.closes();
     let halo = if with_closing { reach } else { 0 };
