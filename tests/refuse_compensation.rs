@@ -90,7 +90,7 @@ fn more_memory_than_there_is_is_refused_with_the_figure() {
     let said = String::from_utf8_lossy(&done.stderr);
     assert_eq!(done.status.code(), Some(2), "{said}");
     // 16,003,000 positions in each of the row's 3,001 rows of positions and of eight rows beside them.
-    assert!(said.starts_with("error: 16000000 columns under cutter ball:30 take 192.6 GB"), "{said}");
+    assert!(said.starts_with("error: 16000000 columns under cutter ball:30 take 192.4 GB"), "{said}");
     assert!(said.contains("GB are free; hint: "), "{said}");
     assert!(!closing.exists());
 }
