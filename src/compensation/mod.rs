@@ -16,6 +16,7 @@
 //! [`Profile::reach`] (twice that for a closing).
 
 mod ball;
+mod band;
 mod blocks;
 mod bounded;
 mod boxes;
@@ -63,6 +64,7 @@ mod weld;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+pub use band::{Band, OutOfReach, Wanted};
 pub use closing::{CAVITY_MM, Closings, closing, residual};
 pub use drop::{Faces, lift};
 pub use facets::Facets;
@@ -70,7 +72,7 @@ pub use marked::Marked;
 pub use passes::{RowPass, RowTarget, machined_by_rows, points, row, rows, rows_by};
 pub use places::Places;
 pub use profile::Profile;
-pub use stream::{Band, OutOfReach, Wanted, stream, stream_bytes};
+pub use stream::{stream, stream_bytes};
 pub use tables::Tables;
 #[doc(hidden)]
 pub use tiles::cutter_location_by;

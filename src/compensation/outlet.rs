@@ -52,6 +52,16 @@ pub(super) struct Tally {
     pub most_mm: f32,
 }
 
+impl Tally {
+    /// Takes a sample of the part and what a closing leaves on it.
+    #[inline(always)]
+    pub fn see(&mut self, h_mm: f32, left_mm: f32) {
+        self.samples += u32::from(!h_mm.is_nan());
+        self.cavities += u32::from(left_mm > CAVITY_MM);
+        self.most_mm = if left_mm > self.most_mm { left_mm } else { self.most_mm };
+    }
+}
+
 impl RowTally {
     #[inline(always)]
     fn add(&self, tally: Tally) {
@@ -205,9 +215,7 @@ impl Closed<'_> {
             let there = !h[i].is_nan();
             let z_mm = if there { sense.give(from[i]) } else { f32::NAN };
             let left_mm = left(z_mm, h[i]);
-            tally.samples += u32::from(there);
-            tally.cavities += u32::from(left_mm > CAVITY_MM);
-            tally.most_mm = if left_mm > tally.most_mm { left_mm } else { tally.most_mm };
+            tally.see(h[i], left_mm);
             let made = [z_mm, left_mm, if there { cut[i] } else { f32::NAN }];
             for (to, made) in [&mut *to, &mut **residual, &mut **cl].into_iter().zip(made) {
                 if let Some(to) = to.get_mut(i) {
