@@ -29,14 +29,8 @@ struct Chain<'b> {
 /// Work on the samples of `out`, every `every`-th row, by searches that go upwards in strips of so many columns. A
 /// thread without a strip takes half of what is left of another one's: threads end together, though a machine seldom
 /// gives them the same speed, and no row is looked at twice but where a strip was halved.
-pub(super) fn on_chains(
-    of: &OnTile<'_>,
-    out: Window,
-    every: usize,
-    reach: usize,
-    width: usize,
-    to: Vec<Outlet<'_>>,
-) {
+pub(super) fn on_chains(of: &OnTile<'_>, out: Window, width: usize, to: Vec<Outlet<'_>>) {
+    let (every, reach) = (of.every as usize, of.profile.reach());
     let threads = rayon::current_num_threads();
     let rows = to.len();
     let mut strips: Vec<VecDeque<Outlet<'_>>> = Vec::new();

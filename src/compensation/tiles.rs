@@ -110,7 +110,7 @@ pub(super) fn on_tiles(
     };
     let of = OnTile::new(h, tables, every, sense, way);
     if is_searched_on_samples(profile, every, way) {
-        return on_chains(&of, out, every, profile.reach(), width, to);
+        return on_chains(&of, out, width, to);
     }
     let across = columns.div_ceil(width);
     let least = TILE_ROWS[0].max(4 * profile.reach());
@@ -149,10 +149,10 @@ fn evenly(columns: usize, most: usize) -> usize {
 /// What is to be done on each tile: `tile.rows` rows, `every` apart.
 pub(super) struct OnTile<'a> {
     h: Rows<'a>,
-    profile: &'a Profile,
+    pub profile: &'a Profile,
     stencil: &'a Stencil,
     cones: Option<&'a Cones>,
-    every: i64,
+    pub every: i64,
     sense: Sense,
     way: Way,
 }
