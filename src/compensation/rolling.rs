@@ -9,7 +9,7 @@ use super::edges::Edges;
 use super::field::{Field, PAD, Targets};
 use super::flank::Flank;
 use super::interval::Beside;
-use super::lanes::{LANES, Vectors};
+use super::lanes::{LANES, Vectors, Work};
 use super::pairs::{OnSamples, Pairs};
 use super::rim::RowBounds;
 use super::runs::{
@@ -162,6 +162,41 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
     }
 }
 
+/// [`raise`] on samples: it is called from several places, and all code of a search should stay in a core's cache.
+struct OneBox<'a, 'b> {
+    field: &'a Field,
+    on: &'a OnSamples<'b>,
+    a: i64,
+    spans: &'a [Span],
+    at: &'a Reachable,
+    out: &'a mut Targets,
+}
+
+impl<V: Vectors> Work<V> for OneBox<'_, '_> {
+    type Done = usize;
+
+    #[inline(always)]
+    fn run(self) -> usize {
+        let OneBox { field, on, a, spans, at, out } = self;
+        let offsets = Offsets::of(at);
+        let [first, len] = spans[0];
+        if len == LANES && offsets.taps() > 3 {
+            let block = Block { a, first, rows: spans.len() };
+            if raise_bundle::<V>(field, on, block, &[u16::MAX; ROWS], &offsets, out) {
+                return BLOCK_WORK.max(offsets.taps() * spans.len());
+            }
+        }
+        let run = Run { a, first, len };
+        if !(spans.iter().all(|span| *span == spans[0])
+            && raise_pair::<V>(field, on, run, spans.len(), &offsets, out))
+        {
+            raise_spans::<V>(field, on, a, spans, &offsets, out);
+        }
+        let taps = offsets.taps() * spans.iter().map(|[_, len]| len).sum::<usize>() / LANES;
+        BLOCK_WORK.max(taps)
+    }
+}
+
 /// Raises the targets by some samples of one box.
 #[inline(always)]
 fn raise<V: Vectors, P: Pairs>(
@@ -171,23 +206,8 @@ fn raise<V: Vectors, P: Pairs>(
     at: &Reachable,
     out: &mut Targets,
 ) -> usize {
-    if let Some(samples) = on.pairs.on_samples() {
-        let offsets = Offsets::of(at);
-        let [first, len] = spans[0];
-        if len == LANES && offsets.taps() > 3 {
-            let block = Block { a, first, rows: spans.len() };
-            if raise_bundle::<V>(on.field, samples, block, &[u16::MAX; ROWS], &offsets, out) {
-                return BLOCK_WORK.max(offsets.taps() * spans.len());
-            }
-        }
-        let run = Run { a, first, len };
-        if !(spans.iter().all(|span| *span == spans[0])
-            && raise_pair::<V>(on.field, samples, run, spans.len(), &offsets, out))
-        {
-            raise_spans::<V>(on.field, samples, a, spans, &offsets, out);
-        }
-        let taps = offsets.taps() * spans.iter().map(|[_, len]| len).sum::<usize>() / LANES;
-        return BLOCK_WORK.max(taps);
+    if let Some(on_samples) = on.pairs.on_samples() {
+        return V::apart(OneBox { field: on.field, on: on_samples, a, spans, at, out });
     }
     for (r, &[first, len]) in spans.iter().enumerate() {
         if len > 0 {
