@@ -5,7 +5,7 @@ use super::blocks::{Block, Lanes, ROWS, bend, count, measure, spans_of};
 use super::contact::{MANY, On, ROW_WORK, Touch};
 use super::feed::{Ahead, Feed};
 use super::field::{Field, PAD, Targets};
-use super::lanes::{LANES, LEAST, Vectors};
+use super::lanes::{LANES, LEAST, Vectors, Work};
 use super::pairs::Pairs;
 use super::slopes::Rises;
 use std::marker::PhantomData;
@@ -173,7 +173,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 None => {
                     let Some((all, grain_mm)) = of_edge else { continue };
                     if self.in_reach(block, &all) {
-                        self.split(block, &all, grain_mm, out);
+                        V::apart(Split { search: self, block, all: &all, grain_mm, out });
                         if self.work as f64 > self.most {
                             return;
                         }
@@ -325,6 +325,24 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
         if most[1] > 0 {
             self.known[column][1] = kept[1];
         }
+    }
+}
+
+/// [`Search::split`] in a function of its own.
+struct Split<'a, 'b, V: Vectors, P: Pairs, T: Touch<V, P>> {
+    search: &'a mut Search<'b, V, P, T>,
+    block: Block,
+    all: &'a Rises,
+    grain_mm: f32,
+    out: &'a mut Targets,
+}
+
+impl<V: Vectors, P: Pairs, T: Touch<V, P>> Work<V> for Split<'_, '_, V, P, T> {
+    type Done = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.search.split(self.block, self.all, self.grain_mm, self.out);
     }
 }
 
