@@ -1,6 +1,6 @@
 use super::field::{Field, PAD};
 use super::lanes::{LANES, LEAST, Vectors, groups};
-use super::runs::Span;
+use super::patches::Patch;
 use super::slopes::Rises;
 
 /// Rows of a block; it is [`LANES`] samples wide.
@@ -339,16 +339,22 @@ pub(super) fn least_rise<V: Vectors>(
     V::least(least)
 }
 
-/// From the first to the last of these samples of a block, row by row.
+/// The least patch around these samples of a block.
 #[inline(always)]
-pub(super) fn spans_of(block: Block, bits: &[u16; ROWS]) -> [Span; ROWS] {
-    let mut spans = [[0; 2]; ROWS];
-    for (span, &bits) in spans.iter_mut().zip(bits) {
-        let first = bits.trailing_zeros() as usize;
-        let end = LANES - bits.leading_zeros() as usize;
-        *span = [block.first + first, end.saturating_sub(first)];
+pub(super) fn patch_of(block: Block, bits: &[u16; ROWS]) -> Patch {
+    let (mut all, mut rows) = (0, 0u32);
+    for (r, &bits) in bits.iter().enumerate() {
+        all |= bits;
+        rows |= u32::from(bits != 0) << r;
     }
-    spans
+    let low = rows.trailing_zeros().min(ROWS as u32);
+    let left = all.trailing_zeros();
+    Patch {
+        a: block.a + i64::from(low),
+        rows: (u32::BITS - rows.leading_zeros()).saturating_sub(low) as usize,
+        first: block.first + left as usize,
+        len: (LANES as u32 - all.leading_zeros()).saturating_sub(left) as usize,
+    }
 }
 
 /// How many samples of a block these are.

@@ -21,8 +21,8 @@ use super::field::{Field, Targets};
 use super::lanes::{Vectors, widest};
 use super::listed::Listed;
 use super::pairs::Pairs;
+use super::patches::Patch;
 use super::rolling::Rolling;
-use super::runs::Span;
 use super::search::{Progress, search};
 use super::slopes::Rises;
 use super::unboxed;
@@ -54,8 +54,8 @@ pub(super) trait Touch<V: Vectors, P: Pairs> {
     /// Offsets along y, at least, at which samples with these rises can touch.
     fn rows(&self, rises: &Rises) -> [f64; 2];
 
-    /// Raises the targets by samples of the rows from `a` on that share offsets; gives what work it was.
-    fn raise(&mut self, on: On<'_, P>, a: i64, spans: &[Span], at: &Self::At, out: &mut Targets) -> usize;
+    /// Raises the targets by samples that share offsets; gives what work it was.
+    fn raise(&mut self, on: On<'_, P>, patch: Patch, at: &Self::At, out: &mut Targets) -> usize;
 
     /// Raises the targets by a block that lies beside all of them; gives what work it was, and the samples that are
     /// left. None, and nothing done, if it does not lie there.

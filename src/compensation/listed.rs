@@ -6,7 +6,8 @@ use super::contact::{BLOCK_WORK, On, Touch};
 use super::field::Targets;
 use super::lanes::{LANES, Vectors};
 use super::pairs::{OnSamples, Pairs};
-use super::runs::{BoxRows, Offsets, One, Span, raise_narrow, raise_spans};
+use super::patches::{Patch, raise_patch};
+use super::runs::{BoxRows, Offsets, One, raise_narrow};
 use super::slopes::Rises;
 
 /// Rows of offsets that samples of one facet may have, at most, to be taken together.
@@ -180,12 +181,12 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Listed<'_, V> {
     }
 
     #[inline(always)]
-    fn raise(&mut self, on: On<'_, P>, a: i64, spans: &[Span], at: &Spots, out: &mut Targets) -> usize {
+    fn raise(&mut self, on: On<'_, P>, patch: Patch, at: &Spots, out: &mut Targets) -> usize {
         let Some(samples) = on.pairs.on_samples() else { return 0 };
         for stretch in &at.stretches[..at.count] {
             let [dy, low, high] = [stretch.dy, stretch.low, stretch.high].map(i32::from);
             let offsets = Offsets { x: [low, high], y: [dy, dy] };
-            raise_spans::<V>(on.field, samples, a, spans, &offsets, out);
+            raise_patch::<V>(on.field, samples, patch, &offsets, out);
         }
         BLOCK_WORK * at.count
     }

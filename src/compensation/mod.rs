@@ -43,6 +43,7 @@ mod meridian;
 mod outlet;
 mod pairs;
 mod passes;
+mod patches;
 mod places;
 mod profile;
 mod ridges;

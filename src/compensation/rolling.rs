@@ -1,7 +1,7 @@
 //! Where samples can touch a ball: boxes of offsets in closed form.
 
 use super::ball::{Ball, Reachable};
-use super::blocks::{Block, Lanes, ROWS, count, spans_of};
+use super::blocks::{Block, Lanes, ROWS, count, patch_of};
 use super::boxes::Boxes;
 use super::bundle::raise_bundle;
 use super::contact::{BLOCK_WORK, MANY, On, ROW_WORK, Touch};
@@ -9,12 +9,11 @@ use super::edges::Edges;
 use super::field::{Field, PAD, Targets};
 use super::flank::Flank;
 use super::interval::Beside;
-use super::lanes::{LANES, Vectors, Work};
+use super::lanes::{LANES, Vectors};
 use super::pairs::{OnSamples, Pairs};
+use super::patches::{Patch, raise_patch};
 use super::rim::RowBounds;
-use super::runs::{
-    BoxRows, Offsets, Run, Span, raise_narrow, raise_pair, raise_rows, raise_run, raise_spans, row_work,
-};
+use super::runs::{BoxRows, Offsets, Run, raise_narrow, raise_rows, raise_run, row_work};
 use super::slopes::Rises;
 use super::sweep::Moderate;
 
@@ -40,6 +39,9 @@ const BLUNT: f64 = 80.0;
 
 /// The same for a block of an even bend: all its samples can touch.
 const EVEN: f64 = 250.0;
+
+/// Offsets of a whole block, at most, for it to be taken as a patch; else it is a bundle.
+const PATCH: usize = 9;
 
 /// Columns of such a box at most: the padding of a field holds a tile and as much again.
 const WIDEST: f64 = 2.0 * LANES as f64;
@@ -91,8 +93,8 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
     }
 
     #[inline(always)]
-    fn raise(&mut self, on: On<'_, P>, a: i64, spans: &[Span], at: &Reachable, out: &mut Targets) -> usize {
-        raise::<V, P>(&on, a, spans, at, out)
+    fn raise(&mut self, on: On<'_, P>, patch: Patch, at: &Reachable, out: &mut Targets) -> usize {
+        raise::<V, P>(&on, patch, at, out)
     }
 
     #[inline(always)]
@@ -162,58 +164,24 @@ impl<V: Vectors, P: Pairs> Touch<V, P> for Rolling<V> {
     }
 }
 
-/// [`raise`] on samples: it is called from several places, and all code of a search should stay in a core's cache.
-struct OneBox<'a, 'b> {
-    field: &'a Field,
-    on: &'a OnSamples<'b>,
-    a: i64,
-    spans: &'a [Span],
-    at: &'a Reachable,
-    out: &'a mut Targets,
-}
-
-impl<V: Vectors> Work<V> for OneBox<'_, '_> {
-    type Done = usize;
-
-    #[inline(always)]
-    fn run(self) -> usize {
-        let OneBox { field, on, a, spans, at, out } = self;
-        let offsets = Offsets::of(at);
-        let [first, len] = spans[0];
-        if len == LANES && offsets.taps() > 3 {
-            let block = Block { a, first, rows: spans.len() };
-            if raise_bundle::<V>(field, on, block, &[u16::MAX; ROWS], &offsets, out) {
-                return BLOCK_WORK.max(offsets.taps() * spans.len());
-            }
-        }
-        let run = Run { a, first, len };
-        if !(spans.iter().all(|span| *span == spans[0])
-            && raise_pair::<V>(field, on, run, spans.len(), &offsets, out))
-        {
-            raise_spans::<V>(field, on, a, spans, &offsets, out);
-        }
-        let taps = offsets.taps() * spans.iter().map(|[_, len]| len).sum::<usize>() / LANES;
-        BLOCK_WORK.max(taps)
-    }
-}
-
 /// Raises the targets by some samples of one box.
 #[inline(always)]
-fn raise<V: Vectors, P: Pairs>(
-    on: &On<'_, P>,
-    a: i64,
-    spans: &[Span],
-    at: &Reachable,
-    out: &mut Targets,
-) -> usize {
-    if let Some(on_samples) = on.pairs.on_samples() {
-        return V::apart(OneBox { field: on.field, on: on_samples, a, spans, at, out });
-    }
-    for (r, &[first, len]) in spans.iter().enumerate() {
-        if len > 0 {
-            let run = Run { a: a + r as i64, first, len };
-            raise_run::<V, P>(on.field, on.pairs, run, at, out, None);
+fn raise<V: Vectors, P: Pairs>(on: &On<'_, P>, patch: Patch, at: &Reachable, out: &mut Targets) -> usize {
+    if let Some(samples) = on.pairs.on_samples() {
+        let offsets = Offsets::of(at);
+        let taps = offsets.taps();
+        if patch.len == LANES && taps > PATCH {
+            let block = Block { a: patch.a, first: patch.first, rows: patch.rows };
+            if raise_bundle::<V>(on.field, samples, block, &[u16::MAX; ROWS], &offsets, out) {
+                return BLOCK_WORK.max(taps * patch.rows);
+            }
         }
+        raise_patch::<V>(on.field, samples, patch, &offsets, out);
+        return BLOCK_WORK.max(taps * patch.rows * patch.len / LANES);
+    }
+    for a in patch.a..patch.a + patch.rows as i64 {
+        let run = Run { a, first: patch.first, len: patch.len };
+        raise_run::<V, P>(on.field, on.pairs, run, at, out, None);
     }
     BLOCK_WORK
 }
@@ -258,8 +226,7 @@ impl<V: Vectors> Rolling<V> {
                 small[r] &= !these;
                 self.boxes.boxed[r] &= !these;
             }
-            let spans = spans_of(block, &these);
-            work += raise::<V, P>(on, block.a, &spans[..block.rows], &hull, out);
+            work += raise::<V, P>(on, patch_of(block, &these), &hull, out);
         }
         work
     }

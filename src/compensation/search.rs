@@ -1,12 +1,13 @@
 //! The search for contacts, block by block: what is known from one block helps with the next.
 
 use super::Profile;
-use super::blocks::{Block, Lanes, ROWS, bend, count, measure, spans_of};
+use super::blocks::{Block, Lanes, ROWS, bend, count, measure, patch_of};
 use super::contact::{MANY, On, ROW_WORK, Touch};
 use super::feed::{Ahead, Feed};
 use super::field::{Field, PAD, Targets};
 use super::lanes::{LANES, LEAST, Vectors, Work};
 use super::pairs::Pairs;
+use super::patches::Patch;
 use super::slopes::Rises;
 use std::marker::PhantomData;
 
@@ -221,9 +222,9 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
     #[inline(always)]
     fn raise_level(&mut self, a: i64, rows: usize, level: &mut Level<T::At>, out: &mut Targets) {
         if level.len > 0 {
-            let spans = [[level.first, level.len]; ROWS];
+            let patch = Patch { a, rows, first: level.first, len: level.len };
             let on = On { field: self.field, pairs: self.pairs };
-            self.work += self.touch.raise(on, a, &spans[..rows], &level.known.at, out);
+            self.work += self.touch.raise(on, patch, &level.known.at, out);
             level.len = 0;
         }
     }
@@ -231,9 +232,8 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
     /// Raises the targets by some samples of a block, which share offsets.
     #[inline(always)]
     fn raise_some(&mut self, block: Block, bits: &[u16; ROWS], at: &T::At, out: &mut Targets) {
-        let spans = spans_of(block, bits);
         let on = On { field: self.field, pairs: self.pairs };
-        self.work += self.touch.raise(on, block.a, &spans[..block.rows], at, out);
+        self.work += self.touch.raise(on, patch_of(block, bits), at, out);
     }
 
     /// A block of more than one facet.
