@@ -21,7 +21,7 @@ const STRIP: [usize; 2] = [256, 2048];
 const STRIP_REACHES: usize = 24;
 
 /// Rows of samples in which targets are worked on strip by strip.
-const BAND: usize = 32;
+const BAND: usize = 16;
 
 widest! {
     /// Gives each row of targets by every sample in its reach, of which `field` holds few more than these.
@@ -59,7 +59,14 @@ pub(super) fn body<V: Vectors>(
         for strip in (0..columns).step_by(fold.strip) {
             for (k, row) in rows.chunks_exact_mut(stride).take(to.len()).enumerate() {
                 let columns = fold.strip.min(columns - strip);
-                fold.row::<V>(field, first + (k * every) as i64, left + strip, columns, &mut row[strip..]);
+                let ahead = Ahead {
+                    h,
+                    row: input.row + taken + (k * every) as i64,
+                    rows: every as i64,
+                    column: input.column + on.shift + strip as i64 - h.window.column,
+                };
+                let row = &mut row[strip..];
+                fold.row::<V>(field, first + (k * every) as i64, left + strip, columns, ahead, row);
             }
         }
         for (to, row) in to.iter_mut().zip(rows.chunks_exact(stride)) {
@@ -85,9 +92,37 @@ pub(super) fn work(profile: &Profile, columns: usize, rows: usize) -> f64 {
 #[repr(align(64))]
 struct Pair([[f32; LANES]; TILE / LANES]);
 
+/// Samples of the band after the one that is worked on.
+#[derive(Clone, Copy)]
+struct Ahead<'a> {
+    h: Rows<'a>,
+    row: i64,
+    rows: i64,
+    /// Where the strip begins in a row.
+    column: i64,
+}
+
+impl Ahead<'_> {
+    /// Asks for those of a tile, which come from memory beside what is done until they are taken.
+    #[inline(always)]
+    fn fetch<V: Vectors>(&self, tile: usize) {
+        let window = self.h.window;
+        for row in self.row.max(window.row)..(self.row + self.rows).min(window.row_end()) {
+            let z = self.h.row(row);
+            for i in (0..TILE).step_by(LANES) {
+                if let Some(z) = z.get((self.column + (tile + i) as i64) as usize) {
+                    V::fetch(z);
+                }
+            }
+        }
+    }
+}
+
 /// A strip of a row of targets, and what is worked out on the way.
-struct Fold<'a> {
-    stencil: &'a Stencil,
+struct Fold {
+    /// The cutter: s(dx, dy) by dx, in the order of dy, and where each dx ends.
+    s: Vec<f32>,
+    ends: Vec<usize>,
     reach: usize,
     /// Columns of targets in a strip.
     strip: usize,
@@ -99,38 +134,54 @@ struct Fold<'a> {
     stride: usize,
 }
 
-impl Fold<'_> {
-    fn new(stencil: &Stencil, reach: usize, columns: usize) -> Fold<'_> {
+impl Fold {
+    fn new(stencil: &Stencil, reach: usize, columns: usize) -> Fold {
+        let (mut s, mut ends) = (Vec::new(), Vec::new());
+        for dx in 0..=reach as i64 {
+            if let Some(arc) = stencil.arc(dx) {
+                s.extend((0..=arc.arc.hi).map(|dy| arc.s(dy)));
+            }
+            ends.push(s.len());
+        }
         let strip = (STRIP_REACHES * reach).clamp(STRIP[0], STRIP[1]).min(columns).next_multiple_of(TILE);
         let stride = (strip + 2 * reach + LANES).next_multiple_of(TILE) + TILE;
         let pairs = vec![Pair([[NONE; LANES]; TILE / LANES]); reach + 1];
-        Fold { stencil, reach, strip, pairs, sums: vec![NONE; (reach + 1) * stride + LANES], stride }
+        Fold { s, ends, reach, strip, pairs, sums: vec![NONE; (reach + 1) * stride + LANES], stride }
     }
 
     /// Targets whose axes stand in row `centre` of the field, the cutter's left end from column `left` on.
     #[inline(always)]
-    fn row<V: Vectors>(&mut self, field: &Field, centre: i64, left: usize, columns: usize, to: &mut [f32]) {
+    fn row<V: Vectors>(
+        &mut self,
+        field: &Field,
+        centre: i64,
+        left: usize,
+        columns: usize,
+        ahead: Ahead<'_>,
+        to: &mut [f32],
+    ) {
         let (reach, stride) = (self.reach, self.stride);
         let origin = line(&self.sums);
         // All is worked out from a cache line on.
         let (start, beside) = (PAD + left / LANES * LANES, left % LANES);
         for tile in (0..columns + 2 * reach + beside).step_by(TILE) {
             let i = start + tile;
+            ahead.fetch::<V>(tile);
             for (pair, dy) in self.pairs.iter_mut().zip(0..) {
                 let [below, above] = [-dy, dy].map(|dy| groups(&field.row(centre + dy)[i..][..TILE]));
                 for ((pair, below), above) in pair.0.iter_mut().zip(below).zip(above) {
                     V::store(V::greater(V::load(below), V::load(above)), pair);
                 }
             }
+            let mut from = 0;
             for (dx, sums) in self.sums[origin..].chunks_exact_mut(stride).enumerate() {
                 let mut best = [V::splat(NONE); TILE / LANES];
-                if let Some(arc) = self.stencil.arc(dx as i64) {
-                    let s = &arc.values[arc.index(arc.arc.hi)..=arc.index(0)];
-                    for (pair, s) in self.pairs.iter().zip(s.iter().rev()) {
-                        let s = V::splat(*s);
-                        for (best, pair) in best.iter_mut().zip(&pair.0) {
-                            *best = V::greater(*best, V::add(V::load(pair), s));
-                        }
+                let of_dx = &self.s[from..self.ends[dx]];
+                from = self.ends[dx];
+                for (pair, s) in self.pairs.iter().zip(of_dx) {
+                    let s = V::splat(*s);
+                    for (best, pair) in best.iter_mut().zip(&pair.0) {
+                        *best = V::greater(*best, V::add(V::load(pair), s));
                     }
                 }
                 for (to, best) in groups_mut(&mut sums[tile..][..TILE]).iter_mut().zip(best) {

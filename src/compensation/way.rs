@@ -14,7 +14,7 @@ const LEAST_SEARCH: f64 = 4.0;
 /// Sums by which a position is found by every sample, up to which that is less work than looking for contacts: so many,
 /// and so many more for each row of samples from one row of positions to the next, for a search looks at all of these.
 const FEW_SUMS: f64 = 12.0;
-const FEW_SUMS_A_ROW: f64 = 32.0;
+const FEW_SUMS_A_ROW: f64 = 24.0;
 
 /// Work for a sample, in groups of lanes, from which leaving out by maxima is faster than looking for contacts by a
 /// table, as on surfaces that touch a flat bottom's rim nearly everywhere; and as part of taking every sample, where
