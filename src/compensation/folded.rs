@@ -15,7 +15,7 @@ use super::stencil::Stencil;
 use crate::grid::Window;
 
 /// Columns that are worked on together, at least and at most: the samples in reach stay in the nearest cache.
-const STRIP: [usize; 2] = [256, 2048];
+const STRIP: [usize; 2] = [512, 2048];
 
 /// The same by the reach of a cutter, both sides of which are worked on besides.
 const STRIP_REACHES: usize = 24;
