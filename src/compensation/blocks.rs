@@ -140,13 +140,11 @@ impl Lanes {
         let (y_next, y_before) = (V::splat(by.y_next), V::splat(by.y_before));
         let mut held = [0; ROWS];
         for r in 0..ROWS {
-            if of[r] != 0 {
-                held[r] = of[r]
-                    & V::at_least(V::load(&self.x_next[r]), x_next)
-                    & V::at_least(x_before, V::load(&self.x_before[r]))
-                    & V::at_least(V::load(&self.y_next[r]), y_next)
-                    & V::at_least(y_before, V::load(&self.y_before[r]));
-            }
+            held[r] = of[r]
+                & V::at_least(V::load(&self.x_next[r]), x_next)
+                & V::at_least(x_before, V::load(&self.x_before[r]))
+                & V::at_least(V::load(&self.y_next[r]), y_next)
+                & V::at_least(y_before, V::load(&self.y_before[r]));
         }
         held
     }
@@ -157,11 +155,9 @@ impl Lanes {
         let within = V::splat(within_mm);
         let mut level = [0; ROWS];
         for r in 0..ROWS {
-            if of[r] != 0 {
-                let x = V::subtract(V::load(&self.x_before[r]), V::load(&self.x_next[r]));
-                let y = V::subtract(V::load(&self.y_before[r]), V::load(&self.y_next[r]));
-                level[r] = of[r] & V::at_least(within, V::greater(x, y));
-            }
+            let x = V::subtract(V::load(&self.x_before[r]), V::load(&self.x_next[r]));
+            let y = V::subtract(V::load(&self.y_before[r]), V::load(&self.y_next[r]));
+            level[r] = of[r] & V::at_least(within, V::greater(x, y));
         }
         level
     }
@@ -172,11 +168,9 @@ impl Lanes {
         let (most, least) = (V::splat(most_mm), V::splat(-most_mm));
         let mut gentle = [0; ROWS];
         for r in 0..ROWS {
-            if of[r] != 0 {
-                let lowest = V::less(V::load(&self.x_next[r]), V::load(&self.y_next[r]));
-                let highest = V::greater(V::load(&self.x_before[r]), V::load(&self.y_before[r]));
-                gentle[r] = of[r] & V::at_least(most, highest) & V::at_least(lowest, least);
-            }
+            let lowest = V::less(V::load(&self.x_next[r]), V::load(&self.y_next[r]));
+            let highest = V::greater(V::load(&self.x_before[r]), V::load(&self.y_before[r]));
+            gentle[r] = of[r] & V::at_least(most, highest) & V::at_least(lowest, least);
         }
         gentle
     }
@@ -188,11 +182,9 @@ impl Lanes {
         let within = V::splat(within_mm);
         let mut these = [0; ROWS];
         for r in 0..ROWS {
-            if of[r] != 0 {
-                let x = V::subtract(V::load(&self.x_next[r]), V::load(&self.x_before[r]));
-                let y = V::subtract(V::load(&self.y_next[r]), V::load(&self.y_before[r]));
-                these[r] = of[r] & V::at_least(within, V::greater(x, y));
-            }
+            let x = V::subtract(V::load(&self.x_next[r]), V::load(&self.x_before[r]));
+            let y = V::subtract(V::load(&self.y_next[r]), V::load(&self.y_before[r]));
+            these[r] = of[r] & V::at_least(within, V::greater(x, y));
         }
         these
     }
@@ -203,15 +195,13 @@ impl Lanes {
         let (most, least) = (V::splat(most_mm), V::splat(-most_mm));
         let mut these = [0; ROWS];
         for r in 0..ROWS {
-            if of[r] != 0 {
-                let kept = match side {
-                    Side::Right => V::at_least(V::load(&self.x_next[r]), least),
-                    Side::Left => V::at_least(most, V::load(&self.x_before[r])),
-                    Side::Up => V::at_least(V::load(&self.y_next[r]), least),
-                    Side::Down => V::at_least(most, V::load(&self.y_before[r])),
-                };
-                these[r] = of[r] & !kept;
-            }
+            let kept = match side {
+                Side::Right => V::at_least(V::load(&self.x_next[r]), least),
+                Side::Left => V::at_least(most, V::load(&self.x_before[r])),
+                Side::Up => V::at_least(V::load(&self.y_next[r]), least),
+                Side::Down => V::at_least(most, V::load(&self.y_before[r])),
+            };
+            these[r] = of[r] & !kept;
         }
         these
     }
