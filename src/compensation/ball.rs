@@ -103,7 +103,7 @@ impl Ball {
             let before = at.lattice_points();
             at = self.sweep(at, slopes)?;
             let now = at.lattice_points();
-            if now <= 2.6 || now > 0.9 * before {
+            if now <= 2.6 || now > 0.75 * before {
                 break;
             }
         }

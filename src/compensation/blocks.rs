@@ -31,45 +31,49 @@ pub(super) struct Measured<V: Vectors> {
     is_whole: bool,
 }
 
+/// The rows that side by side blocks are told by: one below them, theirs, and one above.
+pub(super) struct Lines<'a>([&'a [f32]; ROWS + 2]);
+
+impl<'a> Lines<'a> {
+    #[inline(always)]
+    pub fn of(field: &'a Field, a: i64, rows: usize) -> Lines<'a> {
+        Lines(std::array::from_fn(|k| field.row(a + k.min(rows + 1) as i64 - 1)))
+    }
+}
+
 /// The rises of a block; None where it has no data.
 #[inline(always)]
-pub(super) fn measure<V: Vectors>(field: &Field, block: Block) -> Option<Measured<V>> {
+pub(super) fn measure<V: Vectors>(lines: &Lines<'_>, block: Block) -> Option<Measured<V>> {
     let i = PAD + block.first;
-    let mut below = V::load(group(field.row(block.a - 1), i));
-    let mut z = V::load(group(field.row(block.a), i));
+    let Lines(lines) = lines;
+    let lines = &lines[..block.rows + 2];
+    let mut z = V::load(group(lines[1], i));
+    let mut before = V::subtract(z, V::load(group(lines[0], i)));
     let mut x_next = V::splat(f32::MAX);
     let mut x_before = V::splat(f32::MIN);
     let (mut y_next, mut y_before) = (x_next, x_before);
     let mut lowest = x_next;
-    let mut before = V::subtract(z, below);
-    for r in 0..block.rows {
-        let row = field.row(block.a + r as i64);
-        let above = V::load(group(field.row(block.a + r as i64 + 1), i));
+    for pair in lines[1..].windows(2) {
+        let (row, above) = (pair[0], V::load(group(pair[1], i)));
         x_next = V::less(x_next, V::subtract(V::load(group(row, i + 1)), z));
         x_before = V::greater(x_before, V::subtract(z, V::load(group(row, i - 1))));
         y_before = V::greater(y_before, before);
         before = V::subtract(above, z);
         y_next = V::less(y_next, before);
         lowest = V::less(lowest, z);
-        below = z;
         z = above;
     }
-    let _ = below;
     let is_whole = V::at_least(lowest, V::splat(LEAST)) == u16::MAX;
-    if !is_whole && !has_data::<V>(field, block) {
+    if !is_whole && !has_data::<V>(&lines[1..=block.rows], i) {
         return None;
     }
     Some(Measured { x_next, x_before, y_next, y_before, is_whole })
 }
 
 #[inline(always)]
-fn has_data<V: Vectors>(field: &Field, block: Block) -> bool {
-    let mut data = 0;
-    for r in 0..block.rows {
-        let z = V::load(group(field.row(block.a + r as i64), PAD + block.first));
-        data |= V::at_least(z, V::splat(LEAST));
-    }
-    data != 0
+fn has_data<V: Vectors>(lines: &[&[f32]], i: usize) -> bool {
+    let least = V::splat(LEAST);
+    lines.iter().any(|line| V::at_least(V::load(group(line, i)), least) != 0)
 }
 
 impl<V: Vectors> Measured<V> {

@@ -87,6 +87,15 @@ pub(super) struct On<'a, P: Pairs> {
     pub pairs: &'a P,
 }
 
+impl<P: Pairs> Clone for On<'_, P> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<P: Pairs> Copy for On<'_, P> {}
+
 widest! {
     /// Raises the targets by every sample of the field that can touch a ball there, or sets
     /// `given_up` because it is more work than `most`, in groups of lanes.

@@ -1,7 +1,7 @@
 //! The search for contacts, block by block: what is known from one block helps with the next.
 
 use super::Profile;
-use super::blocks::{Block, Lanes, ROWS, bend, count, measure, patch_of};
+use super::blocks::{Block, Lanes, Lines, ROWS, bend, count, measure, patch_of};
 use super::contact::{MANY, On, ROW_WORK, Touch};
 use super::feed::{Ahead, Feed};
 use super::field::{Field, PAD, Targets};
@@ -43,17 +43,15 @@ pub(super) fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
     }
     let radius = profile.radius();
     let mut search = Search::<V, P, T> {
-        field,
-        pairs,
         touch,
         lanes: Lanes::new(),
         alike_mm: (0.4 * profile.step_mm() / radius) as f32,
         work: 0,
         most: 0.0,
         known,
-        vectors: PhantomData,
+        of: PhantomData,
     };
-    let rows = search.field.rows;
+    let rows = field.rows;
     let start = progress.next;
     let end = feed.as_ref().map_or(rows as i64, |feed| feed.end_row()) as f64 - start as f64;
     // Samples before the first target raise few.
@@ -70,10 +68,10 @@ pub(super) fn search<V: Vectors, P: Pairs, T: Touch<V, P>>(
         let part = (((a + count - start) as f64 - lead) / (end - 2.0 * lead)).clamp(0.0, 1.0);
         search.most = (part + ALLOWANCE) * most;
         if let Some(feed) = &mut feed {
-            feed.before::<V>(a as i64, count, search.field);
+            feed.before::<V>(a as i64, count, field);
         }
         let ahead = feed.as_ref().map(|feed| feed.ahead());
-        search.rows(a as i64, count, ahead, out);
+        search.rows(On { field, pairs }, a as i64, count, ahead, out);
         if search.work as f64 > search.most {
             return false;
         }
@@ -116,9 +114,7 @@ struct Level<At> {
     known: Known<At>,
 }
 
-struct Search<'a, V: Vectors, P: Pairs, T: Touch<V, P>> {
-    field: &'a mut Field,
-    pairs: &'a P,
+struct Search<V: Vectors, P: Pairs, T: Touch<V, P>> {
     touch: T,
     lanes: Lanes,
     /// Rises that differ by less move a contact by less than a sample.
@@ -129,13 +125,14 @@ struct Search<'a, V: Vectors, P: Pairs, T: Touch<V, P>> {
     most: f64,
     /// By column of blocks, from the rows before: the facets of most samples.
     known: Vec<[Known<T::At>; 2]>,
-    vectors: PhantomData<V>,
+    of: PhantomData<(V, P)>,
 }
 
-impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
+impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<V, P, T> {
     /// All blocks of some rows.
     #[inline(always)]
-    fn rows(&mut self, a: i64, rows: usize, ahead: Option<Ahead<'_>>, out: &mut Targets) {
+    fn rows(&mut self, on: On<'_, P>, a: i64, rows: usize, ahead: Option<Ahead<'_>>, out: &mut Targets) {
+        let lines = Lines::of(on.field, a, rows);
         let none = Known { rises: Rises::NO_SAMPLE, at: self.touch.nowhere(), is_facet: true };
         let mut level = Level { first: 0, len: 0, known: none };
         for column in 0..self.known.len() - 1 {
@@ -143,8 +140,8 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
             if let Some(ahead) = &ahead {
                 ahead.fetch::<V>(block.first);
             }
-            let Some(measured) = measure::<V>(self.field, block) else {
-                self.raise_level(a, rows, &mut level, out);
+            let Some(measured) = measure::<V>(&lines, block) else {
+                self.raise_level(on, a, rows, &mut level, out);
                 continue;
             };
             if level.len > 0 && level.known.is_facet && measured.is_held(&level.known.rises) {
@@ -159,11 +156,11 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
             } else if measured.is_held(&other.rises) {
                 Some(other)
             } else {
-                let (all, grain_mm) = (measured.rises(), self.grain_mm(block));
+                let (all, grain_mm) = (measured.rises(), grain_mm(on.field, block));
                 of_edge = Some((all, grain_mm));
-                self.facet(Some(block), &all, grain_mm)
+                self.facet(Some((on.field, block)), &all, grain_mm)
             };
-            self.raise_level(a, rows, &mut level, out);
+            self.raise_level(on, a, rows, &mut level, out);
             match known {
                 Some(known) => {
                     if known.is_facet {
@@ -173,8 +170,8 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 }
                 None => {
                     let Some((all, grain_mm)) = of_edge else { continue };
-                    if self.in_reach(block, &all) {
-                        V::apart(Split { search: self, block, all: &all, grain_mm, out });
+                    if self.in_reach(on, block, &all) {
+                        V::apart(Split { search: self, on, block, all: &all, grain_mm, out });
                         if self.work as f64 > self.most {
                             return;
                         }
@@ -182,26 +179,21 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 }
             }
         }
-        self.raise_level(a, rows, &mut level, out);
-    }
-
-    /// About by how much the rises of one plane differ because its heights are rounded.
-    #[inline(always)]
-    fn grain_mm(&self, block: Block) -> f32 {
-        let size = self.field.row(block.a)[PAD + block.first].abs();
-        if size < -LEAST { size * f32::EPSILON } else { 0.0 }
+        self.raise_level(on, a, rows, &mut level, out);
     }
 
     /// The offsets of samples with these rises, if they are few; `of` a block, if they are all those of one.
     #[inline(always)]
-    fn facet(&self, of: Option<Block>, all: &Rises, grain_mm: f32) -> Option<Known<T::At>> {
+    fn facet(&self, of: Option<(&Field, Block)>, all: &Rises, grain_mm: f32) -> Option<Known<T::At>> {
         let spread = all.spread();
         if spread > T::EVEN_SPREAD * self.alike_mm {
             return None;
         }
         let is_even = spread > T::SPREAD * self.alike_mm;
         if is_even
-            && !of.is_some_and(|block| bend::<V>(self.field, block) <= EVEN * self.alike_mm + 4.0 * grain_mm)
+            && !of.is_some_and(|(field, block)| {
+                bend::<V>(field, block) <= EVEN * self.alike_mm + 4.0 * grain_mm
+            })
         {
             return None;
         }
@@ -212,18 +204,24 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
 
     /// Whether samples of this block may reach any target.
     #[inline(always)]
-    fn in_reach(&self, block: Block, all: &Rises) -> bool {
+    fn in_reach(&self, on: On<'_, P>, block: Block, all: &Rises) -> bool {
         let [low, high] = self.touch.rows(all);
         let last = block.a + block.rows as i64 - 1;
-        let (first, last) = (self.pairs.targets(block.a, low, high), self.pairs.targets(last, low, high));
+        let (first, last) = (on.pairs.targets(block.a, low, high), on.pairs.targets(last, low, high));
         first.start < last.end || !first.is_empty()
     }
 
     #[inline(always)]
-    fn raise_level(&mut self, a: i64, rows: usize, level: &mut Level<T::At>, out: &mut Targets) {
+    fn raise_level(
+        &mut self,
+        on: On<'_, P>,
+        a: i64,
+        rows: usize,
+        level: &mut Level<T::At>,
+        out: &mut Targets,
+    ) {
         if level.len > 0 {
             let patch = Patch { a, rows, first: level.first, len: level.len };
-            let on = On { field: self.field, pairs: self.pairs };
             self.work += self.touch.raise(on, patch, &level.known.at, out);
             level.len = 0;
         }
@@ -231,30 +229,27 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
 
     /// Raises the targets by some samples of a block, which share offsets.
     #[inline(always)]
-    fn raise_some(&mut self, block: Block, bits: &[u16; ROWS], at: &T::At, out: &mut Targets) {
-        let on = On { field: self.field, pairs: self.pairs };
+    fn raise_some(&mut self, on: On<'_, P>, block: Block, bits: &[u16; ROWS], at: &T::At, out: &mut Targets) {
         self.work += self.touch.raise(on, patch_of(block, bits), at, out);
     }
 
     /// A block of more than one facet.
     #[inline(always)]
-    fn split(&mut self, block: Block, all: &Rises, grain_mm: f32, out: &mut Targets) {
+    fn split(&mut self, on: On<'_, P>, block: Block, all: &Rises, grain_mm: f32, out: &mut Targets) {
         self.work += ROW_WORK;
-        let on = On { field: self.field, pairs: self.pairs };
         let left = match self.touch.beside(&on, block, all, &mut self.lanes, out) {
             Some((work, left)) => {
                 self.work += work;
                 left
             }
             None => {
-                self.lanes.fill::<V>(self.field, block);
+                self.lanes.fill::<V>(on.field, block);
                 let mut left = self.lanes.data;
-                self.facets(block, grain_mm, &mut left, out);
+                self.facets(on, block, grain_mm, &mut left, out);
                 left
             }
         };
         if left != [0; ROWS] {
-            let on = On { field: self.field, pairs: self.pairs };
             self.work += self.touch.rest(on, block, &self.lanes, &left, out);
         }
     }
@@ -262,7 +257,14 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
     /// Takes the samples of a block that lie on facets: on those of the blocks before it and of
     /// those below, and on others that show themselves.
     #[inline(always)]
-    fn facets(&mut self, block: Block, grain_mm: f32, left: &mut [u16; ROWS], out: &mut Targets) {
+    fn facets(
+        &mut self,
+        on: On<'_, P>,
+        block: Block,
+        grain_mm: f32,
+        left: &mut [u16; ROWS],
+        out: &mut Targets,
+    ) {
         let column = block.first / LANES;
         let before = self.known[column.saturating_sub(1)];
         let after = self.known[column + 1];
@@ -289,7 +291,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
                 for (left, held) in left.iter_mut().zip(&held) {
                     *left &= !held;
                 }
-                self.raise_some(block, &held, &known.at, out);
+                self.raise_some(on, block, &held, &known.at, out);
             }
         }
         for _ in 0..3 {
@@ -313,7 +315,7 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
             for (left, held) in left.iter_mut().zip(&held) {
                 *left &= !held;
             }
-            self.raise_some(block, &held, &known.at, out);
+            self.raise_some(on, block, &held, &known.at, out);
             if count < MANY {
                 break;
             }
@@ -330,7 +332,8 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Search<'_, V, P, T> {
 
 /// [`Search::split`] in a function of its own.
 struct Split<'a, 'b, V: Vectors, P: Pairs, T: Touch<V, P>> {
-    search: &'a mut Search<'b, V, P, T>,
+    search: &'a mut Search<V, P, T>,
+    on: On<'b, P>,
     block: Block,
     all: &'a Rises,
     grain_mm: f32,
@@ -342,8 +345,15 @@ impl<V: Vectors, P: Pairs, T: Touch<V, P>> Work<V> for Split<'_, '_, V, P, T> {
 
     #[inline(always)]
     fn run(self) {
-        self.search.split(self.block, self.all, self.grain_mm, self.out);
+        self.search.split(self.on, self.block, self.all, self.grain_mm, self.out);
     }
+}
+
+/// About by how much the rises of one plane differ because its heights are rounded.
+#[inline(always)]
+fn grain_mm(field: &Field, block: Block) -> f32 {
+    let size = field.row(block.a)[PAD + block.first].abs();
+    if size < -LEAST { size * f32::EPSILON } else { 0.0 }
 }
 
 #[inline(always)]
