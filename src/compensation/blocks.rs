@@ -27,7 +27,7 @@ pub(super) struct Measured<V: Vectors> {
     x_before: V::Group,
     y_next: V::Group,
     y_before: V::Group,
-    /// Whether all samples have data.
+    /// Whether all samples of the first row have data.
     is_whole: bool,
 }
 
@@ -48,11 +48,12 @@ pub(super) fn measure<V: Vectors>(lines: &Lines<'_>, block: Block) -> Option<Mea
     let Lines(lines) = lines;
     let lines = &lines[..block.rows + 2];
     let mut z = V::load(group(lines[1], i));
+    // A sample without data in another row shows in the rises.
+    let is_whole = V::at_least(z, V::splat(LEAST)) == u16::MAX;
     let mut before = V::subtract(z, V::load(group(lines[0], i)));
     let mut x_next = V::splat(f32::MAX);
     let mut x_before = V::splat(f32::MIN);
     let (mut y_next, mut y_before) = (x_next, x_before);
-    let mut lowest = x_next;
     for pair in lines[1..].windows(2) {
         let (row, above) = (pair[0], V::load(group(pair[1], i)));
         x_next = V::less(x_next, V::subtract(V::load(group(row, i + 1)), z));
@@ -60,10 +61,8 @@ pub(super) fn measure<V: Vectors>(lines: &Lines<'_>, block: Block) -> Option<Mea
         y_before = V::greater(y_before, before);
         before = V::subtract(above, z);
         y_next = V::less(y_next, before);
-        lowest = V::less(lowest, z);
         z = above;
     }
-    let is_whole = V::at_least(lowest, V::splat(LEAST)) == u16::MAX;
     if !is_whole && !has_data::<V>(&lines[1..=block.rows], i) {
         return None;
     }
