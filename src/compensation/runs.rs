@@ -194,38 +194,31 @@ pub(super) fn raise_narrow<V: Vectors>(
     out: &mut Targets,
 ) {
     let origin = (first - on.shift) as i32;
-    let [near, far] = [rows.dy, rows.dy - (rows.count as i32 - 1) * on.every as i32];
-    let shortest = on.stencil.arc_there(if near.abs() > far.abs() { near } else { far }).arc;
-    // Past the rim no further than the padding goes.
-    let rim = LANES as i32;
-    if x[1] > shortest.hi + rim || x[0] < shortest.lo - rim {
-        raise_rows::<V>(field, on, [a, first], rows, |_| x, out);
-        return;
-    }
     let start = (origin - x[1]).max(0) & -(LANES as i32);
     if start > (origin - x[0]).min(out.columns as i32 - 1) {
         return;
     }
     let z = V::splat(field.row(a)[PAD + first as usize]);
-    let mut dy = rows.dy;
+    // What is not under the cutter is no data.
+    let (values, axis, stride) = on.stencil.values();
+    let mut at = axis + rows.dy * stride - (origin - start);
+    let down = on.every as i32 * stride;
     if origin - x[0] - start < LANES as i32 {
-        for k in 0..rows.count {
-            let arc = on.stencil.arc_there(dy);
-            let s = groups(&arc.values[arc.index(origin - start)..][..LANES]);
-            let to = groups_mut(&mut out.row_mut(rows.first + k)[start as usize..][..LANES]);
+        for b in rows.first..rows.first + rows.count {
+            let s = groups(&values[at as usize..][..LANES]);
+            let to = groups_mut(&mut out.row_mut(b)[start as usize..][..LANES]);
             V::store(V::greater(V::add(V::load(&s[0]), z), V::load(&to[0])), &mut to[0]);
-            dy -= on.every as i32;
+            at -= down;
         }
     } else {
-        for k in 0..rows.count {
-            let arc = on.stencil.arc_there(dy);
-            let s = groups(&arc.values[arc.index(origin - start)..][..2 * LANES]);
-            let to = groups_mut(&mut out.row_mut(rows.first + k)[start as usize..][..2 * LANES]);
+        for b in rows.first..rows.first + rows.count {
+            let s = groups(&values[at as usize..][..2 * LANES]);
+            let to = groups_mut(&mut out.row_mut(b)[start as usize..][..2 * LANES]);
             let near = V::greater(V::add(V::load(&s[0]), z), V::load(&to[0]));
             let far = V::greater(V::add(V::load(&s[1]), z), V::load(&to[1]));
             V::store(near, &mut to[0]);
             V::store(far, &mut to[1]);
-            dy -= on.every as i32;
+            at -= down;
         }
     }
 }
