@@ -14,14 +14,11 @@ use super::profile::Profile;
 use super::stencil::Stencil;
 use crate::grid::Window;
 
-/// Columns that are worked on together, at least and at most: the samples in reach stay in the nearest cache.
-const STRIP: [usize; 2] = [512, 2048];
+/// Columns that are worked on together, at least and at most: their sums stay in a near cache.
+const STRIP: [usize; 2] = [256, 2048];
 
-/// The same by the reach of a cutter, both sides of which are worked on besides.
+/// The same by the reach of a cutter: so far are they moved from one strip to the next.
 const STRIP_REACHES: usize = 24;
-
-/// Rows of samples in which targets are worked on strip by strip.
-const BAND: usize = 16;
 
 widest! {
     /// Gives each row of targets by every sample in its reach, of which `field` holds few more than these.
@@ -40,38 +37,30 @@ pub(super) fn body<V: Vectors>(
     let Some(first) = to.first() else { return };
     let columns = first.columns();
     let are_many = Outlet::are_many(to);
-    let (reach, every) = (on.reach, on.every as usize);
-    let at_once = BAND.div_ceil(every);
-    field.hold(input, 2 * reach as usize + (at_once - 1) * every + 1);
+    let reach = on.reach;
+    field.hold(input, 2 * reach as usize + 1);
     let mut fold = Fold::new(on.stencil, reach as usize, columns);
-    let stride = columns.next_multiple_of(TILE) + TILE;
-    let mut rows = vec![NONE; at_once * stride];
+    let mut row = vec![NONE; columns.next_multiple_of(TILE) + TILE];
+    // The field's column under the left end of the cutter at the first target.
+    let left = (on.shift - reach) as usize;
     let mut taken = -1;
-    for (band, to) in to.chunks_mut(at_once).enumerate() {
-        let first = on.target(band * at_once) - on.input_row;
-        let last = first + ((to.len() - 1) * every) as i64;
-        for a in (first - reach).max(taken)..=last + reach {
+    for (b, to) in to.iter_mut().enumerate() {
+        let axis = on.target(b) - on.input_row;
+        for a in (axis - reach).max(taken)..=axis + reach {
             field.take(a, h, input, sense);
         }
-        taken = last + reach + 1;
-        // The field's column under the left end of the cutter at the first target.
-        let left = (on.shift - reach) as usize;
+        taken = axis + reach + 1;
+        let next = (axis + on.every - reach).max(taken);
         for strip in (0..columns).step_by(fold.strip) {
-            for (k, row) in rows.chunks_exact_mut(stride).take(to.len()).enumerate() {
-                let columns = fold.strip.min(columns - strip);
-                let ahead = Ahead {
-                    h,
-                    row: input.row + taken + (k * every) as i64,
-                    rows: every as i64,
-                    column: input.column + on.shift + strip as i64 - h.window.column,
-                };
-                let row = &mut row[strip..];
-                fold.row::<V>(field, first + (k * every) as i64, left + strip, columns, ahead, row);
-            }
+            let ahead = Ahead {
+                h,
+                rows: [next, axis + on.every + reach + 1].map(|a| input.row + a),
+                column: input.column + on.shift + strip as i64 - h.window.column,
+            };
+            let columns = fold.strip.min(columns - strip);
+            fold.strip::<V>(field, axis, left, [strip, columns], ahead, &mut row[strip..]);
         }
-        for (to, row) in to.iter_mut().zip(rows.chunks_exact(stride)) {
-            to.give::<V>(sense, row, are_many);
-        }
+        to.give::<V>(sense, &row, are_many);
     }
     V::streamed();
 }
@@ -92,12 +81,12 @@ pub(super) fn work(profile: &Profile, columns: usize, rows: usize) -> f64 {
 #[repr(align(64))]
 struct Pair([[f32; LANES]; TILE / LANES]);
 
-/// Samples of the band after the one that is worked on.
+/// Samples that the targets of the next row need.
 #[derive(Clone, Copy)]
 struct Ahead<'a> {
     h: Rows<'a>,
-    row: i64,
-    rows: i64,
+    /// From the first to before the last.
+    rows: [i64; 2],
     /// Where the strip begins in a row.
     column: i64,
 }
@@ -107,7 +96,8 @@ impl Ahead<'_> {
     #[inline(always)]
     fn fetch<V: Vectors>(&self, tile: usize) {
         let window = self.h.window;
-        for row in self.row.max(window.row)..(self.row + self.rows).min(window.row_end()) {
+        let [first, end] = self.rows;
+        for row in first.max(window.row)..end.min(window.row_end()) {
             let z = self.h.row(row);
             for i in (0..TILE).step_by(LANES) {
                 if let Some(z) = z.get((self.column + (tile + i) as i64) as usize) {
@@ -149,26 +139,34 @@ impl Fold {
         Fold { s, ends, reach, strip, pairs, sums: vec![NONE; (reach + 1) * stride + LANES], stride }
     }
 
-    /// Targets whose axes stand in row `centre` of the field, the cutter's left end from column `left` on.
+    /// Columns `strip ..` of the targets whose axes stand in row `axis` of the field, the cutter's left end from column
+    /// `left` on: after those of the strip before.
     #[inline(always)]
-    fn row<V: Vectors>(
+    fn strip<V: Vectors>(
         &mut self,
         field: &Field,
-        centre: i64,
+        axis: i64,
         left: usize,
-        columns: usize,
+        [strip, columns]: [usize; 2],
         ahead: Ahead<'_>,
         to: &mut [f32],
     ) {
         let (reach, stride) = (self.reach, self.stride);
         let origin = line(&self.sums);
         // All is worked out from a cache line on.
-        let (start, beside) = (PAD + left / LANES * LANES, left % LANES);
-        for tile in (0..columns + 2 * reach + beside).step_by(TILE) {
+        let (start, beside) = (PAD + (left + strip) / LANES * LANES, left % LANES);
+        let mut known = 0;
+        if strip > 0 {
+            known = (2 * reach + beside).next_multiple_of(TILE);
+            for sums in self.sums[origin..].chunks_exact_mut(stride) {
+                sums.copy_within(self.strip..self.strip + known, 0);
+            }
+        }
+        for tile in (known..columns + 2 * reach + beside).step_by(TILE) {
             let i = start + tile;
             ahead.fetch::<V>(tile);
             for (pair, dy) in self.pairs.iter_mut().zip(0..) {
-                let [below, above] = [-dy, dy].map(|dy| groups(&field.row(centre + dy)[i..][..TILE]));
+                let [below, above] = [-dy, dy].map(|dy| groups(&field.row(axis + dy)[i..][..TILE]));
                 for ((pair, below), above) in pair.0.iter_mut().zip(below).zip(above) {
                     V::store(V::greater(V::load(below), V::load(above)), pair);
                 }
