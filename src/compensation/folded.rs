@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strips_and_bands_meet_and_rows_between_are_left_out() {
+    fn strips_meet_and_rows_between_are_left_out() {
         let mut random = surfaces::Random(11);
         let noise = |_, _| if random.next() < 0.01 { f64::NAN } else { 90.0 * random.next() };
         let h = surfaces::from(700, 150, noise);
