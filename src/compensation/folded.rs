@@ -218,21 +218,29 @@ mod tests {
     #[test]
     fn strips_meet_and_rows_between_are_left_out() {
         let mut random = surfaces::Random(11);
-        let noise = |_, _| if random.next() < 0.01 { f64::NAN } else { 90.0 * random.next() };
-        let h = surfaces::from(700, 150, noise);
-        for (cutter, every) in [("ball:0.2", 1), ("ball:0.5", 3), ("vee:60:0:0.12", 7), ("ball:0.1", 40)] {
+        let mut noise = |_, _| if random.next() < 0.01 { f64::NAN } else { 90.0 * random.next() };
+        let [tall, wide] =
+            [(700, 150), (2100, 9)].map(|(columns, rows)| surfaces::from(columns, rows, &mut noise));
+        // The last one's sums go along by more than one tile.
+        for (h, cutter, every) in [
+            (&tall, "ball:0.2", 1),
+            (&tall, "ball:0.5", 3),
+            (&tall, "vee:60:0:0.12", 7),
+            (&tall, "ball:0.1", 40),
+            (&wide, "ball:0.8", 2),
+        ] {
             let tables =
                 Tables::new(Profile::new(cutter.parse().expect("a cutter"), 0.01, 0.0).expect("a profile"));
             for sense in [Sense::Raise, Sense::Lower] {
-                let of = OnTile::new((&h).into(), &tables, every, sense, Way::EveryTap);
+                let of = OnTile::new(h.into(), &tables, every, sense, Way::EveryTap);
                 let out = h.window.grown(4);
                 let rows = out.rows.div_ceil(every);
                 let (input, pairs) = of.pairs(Window { rows, ..out });
                 let [mut folded, mut by_definition] = [0.0, 1.0].map(|z| vec![z; rows * out.columns]);
                 let mut to = Outlet::plain(&mut folded, out.columns);
-                every_sample((&h).into(), input, sense, &pairs, &mut Field::empty(0, 0), &mut to);
+                every_sample(h.into(), input, sense, &pairs, &mut Field::empty(0, 0), &mut to);
                 let mut targets = Targets::new(out.columns, rows);
-                let field = Field::of((&h).into(), input, sense);
+                let field = Field::of(h.into(), input, sense);
                 brute::every_tap(&field, &pairs, false, &mut targets);
                 for (row, to) in Outlet::plain(&mut by_definition, out.columns).iter_mut().enumerate() {
                     to.give_portable(sense, targets.row(row));
