@@ -27,8 +27,8 @@ pub(super) struct Measured<V: Vectors> {
     x_before: V::Group,
     y_next: V::Group,
     y_before: V::Group,
-    /// Whether all samples of the first row have data.
-    is_whole: bool,
+    /// Whether all samples of the first row have data; where others have none, rises are huge.
+    starts_whole: bool,
 }
 
 /// The rows that side by side blocks are told by: one below them, theirs, and one above.
@@ -48,8 +48,7 @@ pub(super) fn measure<V: Vectors>(lines: &Lines<'_>, block: Block) -> Option<Mea
     let Lines(lines) = lines;
     let lines = &lines[..block.rows + 2];
     let mut z = V::load(group(lines[1], i));
-    // A sample without data in another row shows in the rises.
-    let is_whole = V::at_least(z, V::splat(LEAST)) == u16::MAX;
+    let starts_whole = V::at_least(z, V::splat(LEAST)) == u16::MAX;
     let mut before = V::subtract(z, V::load(group(lines[0], i)));
     let mut x_next = V::splat(f32::MAX);
     let mut x_before = V::splat(f32::MIN);
@@ -63,10 +62,10 @@ pub(super) fn measure<V: Vectors>(lines: &Lines<'_>, block: Block) -> Option<Mea
         y_next = V::less(y_next, before);
         z = above;
     }
-    if !is_whole && !has_data::<V>(&lines[1..=block.rows], i) {
+    if !starts_whole && !has_data::<V>(&lines[1..=block.rows], i) {
         return None;
     }
-    Some(Measured { x_next, x_before, y_next, y_before, is_whole })
+    Some(Measured { x_next, x_before, y_next, y_before, starts_whole })
 }
 
 #[inline(always)]
@@ -83,14 +82,14 @@ impl<V: Vectors> Measured<V> {
             & V::at_least(V::splat(by.x_before), self.x_before)
             & V::at_least(self.y_next, V::splat(by.y_next))
             & V::at_least(V::splat(by.y_before), self.y_before);
-        self.is_whole && held == u16::MAX
+        self.starts_whole && held == u16::MAX
     }
 
     /// All of them together; samples without data make them huge.
     #[inline(always)]
     pub fn rises(&self) -> Rises {
         Rises {
-            x_next: if self.is_whole { V::least(self.x_next) } else { f32::MIN },
+            x_next: if self.starts_whole { V::least(self.x_next) } else { f32::MIN },
             x_before: V::most(self.x_before),
             y_next: V::least(self.y_next),
             y_before: V::most(self.y_before),

@@ -68,7 +68,7 @@ impl<V: Vectors> Work<V> for Raise<'_, '_> {
             origin,
             stride,
             a: block.a,
-            row: (on.input_row + block.a - on.target_row) as i32,
+            row: on.row(block.a) as i32,
             rows: [ROWS, 0],
             at: Offsets { x, y },
             ends: [0; ROWS + 1],
@@ -149,36 +149,24 @@ impl Bundle<'_> {
         }
     }
 
-    /// The target rows that it may raise.
-    #[inline(always)]
-    fn target_rows(&self, every: i32, rows: usize) -> std::ops::Range<i32> {
-        let first = self.row + self.rows[0] as i32 - self.at.y[1];
-        let last = self.row + self.rows[1] as i32 - self.at.y[0];
-        if every == 1 {
-            return first.max(0)..(last + 1).min(rows as i32);
-        }
-        let first = if first <= 0 { 0 } else { (first + every - 1) / every };
-        let end = if last < 0 { 0 } else { last / every + 1 };
-        first..end.min(rows as i32)
-    }
-
     /// So many target rows at once with the groups from `start` on: each is to be raised by the bundle's rows from a first
     /// to a last one, at a dy that is so much more than the row. The processor waits for a maximum before it takes the next
     /// of it: some of them side by side keep it at work.
     #[inline(always)]
     fn targets<V: Vectors, const GROUPS: usize, const TARGETS: usize>(
         &self,
-        every: i32,
+        on: &OnSamples,
         start: usize,
         out: &mut Targets,
         raise: impl Fn(&mut [[V::Group; GROUPS]; TARGETS], [i32; TARGETS], [i32; 2]),
     ) {
         let [low, high] = self.at.y;
-        let of = self.target_rows(every, out.rows);
+        let [first, last] = self.rows.map(|r| i64::from(self.row) + r as i64);
+        let of = on.targets_in([first - i64::from(high), last - i64::from(low)]);
         for first in of.clone().step_by(TARGETS) {
             // Past the last one it is taken again.
-            let b: [i32; TARGETS] = std::array::from_fn(|k| (first + k as i32).min(of.end - 1));
-            let level = b.map(|b| self.row - b * every);
+            let b: [usize; TARGETS] = std::array::from_fn(|k| (first + k).min(of.end - 1));
+            let level = b.map(|b| self.row - b as i32 * on.every as i32);
             // Those of either: a row past a target's own lies under the cutter too, or stands in the stencil as no data.
             let rows = [
                 (low - level[0]).max(self.rows[0] as i32),
@@ -189,14 +177,14 @@ impl Bundle<'_> {
             }
             let mut best = [[V::splat(0.0); GROUPS]; TARGETS];
             for (best, b) in best.iter_mut().zip(b) {
-                let line = groups(&out.row_mut(b as usize)[start..][..GROUPS * LANES]);
+                let line = groups(&out.row_mut(b)[start..][..GROUPS * LANES]);
                 for (best, line) in best.iter_mut().zip(line) {
                     *best = V::load(line);
                 }
             }
             raise(&mut best, level, rows);
             for (best, b) in best.iter().zip(b) {
-                let line = groups_mut(&mut out.row_mut(b as usize)[start..][..GROUPS * LANES]);
+                let line = groups_mut(&mut out.row_mut(b)[start..][..GROUPS * LANES]);
                 for (best, line) in best.iter().zip(line) {
                     V::store(*best, line);
                 }
@@ -211,7 +199,7 @@ impl Bundle<'_> {
         start: usize,
         out: &mut Targets,
     ) {
-        self.targets::<V, GROUPS, TARGETS>(on.every as i32, start, out, |best, level, [from, to]| {
+        self.targets::<V, GROUPS, TARGETS>(on, start, out, |best, level, [from, to]| {
             let samples = &self.samples[self.ends[from as usize]..self.ends[to as usize + 1]];
             let at = level.map(|level| self.origin + level * self.stride + start as i32);
             for &(z, back) in samples {
@@ -237,7 +225,7 @@ impl Bundle<'_> {
         let [low, high] = self.at.x;
         let taps = (high - low + 1) as usize;
         let column = (PAD as i32 + start as i32 + on.shift as i32 + low) as usize;
-        self.targets::<V, GROUPS, TARGETS>(on.every as i32, start, out, |best, level, [from, to]| {
+        self.targets::<V, GROUPS, TARGETS>(on, start, out, |best, level, [from, to]| {
             for r in from..=to {
                 if self.ends[r as usize] == self.ends[r as usize + 1] {
                     continue;

@@ -65,14 +65,30 @@ impl OnSamples<'_> {
     pub fn target(&self, b: usize) -> i64 {
         self.target_row + b as i64 * self.every
     }
-}
 
-impl OnSamples<'_> {
+    /// A row of the field, counted from that of target 0.
+    #[inline(always)]
+    pub fn row(&self, a: i64) -> i64 {
+        self.input_row + a - self.target_row
+    }
+
+    /// The targets whose rows lie in `low ..= high`, counted from that of target 0.
+    #[inline(always)]
+    pub fn targets_in(&self, [low, high]: [i64; 2]) -> Range<usize> {
+        if high < low.max(0) {
+            return 0..0;
+        }
+        let (low, end) = (low.max(0) as u32, (high + 1) as u32);
+        let every = self.every as u32;
+        let [first, end] = [low, end].map(|row| if every == 1 { row } else { row.div_ceil(every) } as usize);
+        first..end.min(self.target_rows)
+    }
+
     /// The offsets at which samples of a block reach targets of so many columns, if it lies beside all of them.
     #[inline(always)]
     pub fn within(&self, block: Block, columns: usize) -> Option<Reachable> {
         let column = block.first as i64 - self.shift;
-        let row = self.input_row + block.a - self.target_row;
+        let row = self.row(block.a);
         let (last_column, last_row) = (column + LANES as i64 - 1, row + block.rows as i64 - 1);
         let (right, top) = (columns as i64 - 1, (self.target_rows as i64 - 1) * self.every);
         let is_beside = last_column < 0 || column > right || last_row < 0 || row > top;
@@ -99,18 +115,8 @@ impl Pairs for OnSamples<'_> {
 
     #[inline(always)]
     fn targets(&self, a: i64, low: f64, high: f64) -> Range<usize> {
-        let row = self.input_row + a - self.target_row;
-        let first = (row - high.floor() as i64).max(0);
-        let last = row - low.ceil() as i64;
-        if last < first {
-            return 0..0;
-        }
-        let (first, end) = if self.every == 1 {
-            (first, last + 1)
-        } else {
-            (ceil_div(first, self.every), last / self.every + 1)
-        };
-        (first as usize).min(self.target_rows)..(end.max(0) as usize).min(self.target_rows)
+        let row = self.row(a);
+        self.targets_in([row - high.floor() as i64, row - low.ceil() as i64])
     }
 
     fn inputs(&self, b: usize) -> Range<i64> {
@@ -134,10 +140,6 @@ impl Pairs for OnSamples<'_> {
     fn slack_mm(&self) -> f32 {
         self.stencil.slack_mm
     }
-}
-
-fn ceil_div(a: i64, b: i64) -> i64 {
-    -(-a).div_euclid(b)
 }
 
 /// Rows at any y and x offset over lattice samples: a planner's passes on its controller's grid.

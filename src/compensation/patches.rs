@@ -6,6 +6,7 @@ use super::field::{Field, PAD, Targets};
 use super::lanes::{LANES, Vectors, Work, groups, groups_mut};
 use super::pairs::OnSamples;
 use super::runs::{Offsets, raise_line};
+use std::ops::Range;
 
 /// Samples side by side in some rows.
 #[derive(Clone, Copy)]
@@ -79,8 +80,7 @@ fn lines(on: &OnSamples, patch: &Patch, [lo, hi]: [i32; 2], columns: usize) -> O
 /// A patch at so few offsets that each target row is read and written once.
 struct Small {
     /// Targets, and the row of the field that the first one's lowest offset takes.
-    first: usize,
-    end: usize,
+    targets: Range<usize>,
     a: i64,
     /// Column of the targets, of the samples at the lowest offset, and how many groups of either.
     start: usize,
@@ -90,7 +90,8 @@ struct Small {
 }
 
 impl Small {
-    /// None if some of these offsets are not under the cutter, or if the rows beside the patch are not all in the field.
+    /// None if some of these offsets are not under the cutter, if the rows beside the patch are not all in the field, or
+    /// if it reaches no target.
     #[inline(always)]
     fn of(field: &Field, on: &OnSamples, patch: Patch, at: &Offsets, out: &Targets) -> Option<Small> {
         let ([lo, hi], [low, high]) = (at.x, at.y);
@@ -104,20 +105,12 @@ impl Small {
         if lo < one.lo.max(other.lo) || hi > one.hi.min(other.hi) {
             return None;
         }
-        // Nothing is left of a patch beside the targets.
-        let [start, groups] = lines(on, &patch, at.x, out.columns).unwrap_or([0; 2]);
-        let row = (on.input_row + patch.a - on.target_row) as i32;
-        let every = on.every as i32;
-        let first = first_target(row - high, every);
-        let end = if groups == 0 {
-            0
-        } else {
-            first_target(row + patch.rows as i32 - low, every).min(on.target_rows)
-        };
+        let [start, groups] = lines(on, &patch, at.x, out.columns)?;
+        let row = on.row(patch.a);
+        let targets = on.targets_in([row - i64::from(high), on.row(last) - i64::from(low)]);
         Some(Small {
-            first,
-            end,
-            a: patch.a + first as i64 * on.every - i64::from(row) + i64::from(low),
+            a: patch.a + targets.start as i64 * on.every - row + i64::from(low),
+            targets,
             start,
             from: (PAD as i64 + start as i64 + on.shift + i64::from(lo)) as usize,
             groups,
@@ -138,7 +131,7 @@ impl Small {
             std::array::from_fn(|i| V::splat(arc.s(lo + i as i32)))
         });
         let mut a = self.a;
-        for b in self.first..self.end {
+        for b in self.targets.clone() {
             let input: [[&[[f32; LANES]]; COLUMNS]; ROWS] = std::array::from_fn(|j| {
                 let row = &field.row(a + j as i64)[self.from..][..self.groups * LANES + COLUMNS - 1];
                 std::array::from_fn(|i| &groups(&row[i..])[..self.groups])
@@ -163,7 +156,7 @@ impl Small {
 /// [`raise_patch`] row by row of the cutter.
 #[inline(always)]
 fn by_rows<V: Vectors>(field: &Field, on: &OnSamples, patch: Patch, at: &Offsets, out: &mut Targets) {
-    let every = on.every as i32;
+    let [low, high] = [patch.a, patch.a + patch.rows as i64 - 1].map(|a| on.row(a));
     for dy in at.y[0]..=at.y[1] {
         let Some(arc) = on.stencil.arc(i64::from(dy)) else { continue };
         let (lo, hi) = (at.x[0].max(arc.arc.lo), at.x[1].min(arc.arc.hi));
@@ -174,20 +167,11 @@ fn by_rows<V: Vectors>(field: &Field, on: &OnSamples, patch: Patch, at: &Offsets
         let s = &arc.values[arc.index(hi)..][..(hi - lo + 1) as usize];
         let length = groups * LANES;
         let from = (PAD as i64 + start as i64 + on.shift + i64::from(lo)) as usize;
-        let row = (on.input_row + patch.a - on.target_row) as i32 - dy;
-        let first = first_target(row, every);
-        let end = first_target(row + patch.rows as i32, every).min(on.target_rows);
-        for b in first..end {
-            let a = patch.a + i64::from(b as i32 * every - row);
+        let dy = i64::from(dy);
+        for b in on.targets_in([low - dy, high - dy]) {
+            let a = patch.a + b as i64 * on.every + dy - low;
             let input = &field.row(a)[from..][..length + s.len() - 1];
             raise_line::<V>(&mut out.row_mut(b)[start..][..length], input, s);
         }
     }
-}
-
-/// The first target at this row of samples, counted from that of target 0, or above it.
-#[inline(always)]
-fn first_target(row: i32, every: i32) -> usize {
-    let row = row.max(0) as u32;
-    if every == 1 { row as usize } else { row.div_ceil(every as u32) as usize }
 }

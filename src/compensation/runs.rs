@@ -167,18 +167,11 @@ pub(super) struct BoxRows {
 impl BoxRows {
     #[inline(always)]
     pub fn of(on: &OnSamples, a: i64, at: &Offsets) -> BoxRows {
-        let every = on.every as i32;
-        let row = (on.input_row + a - on.target_row) as i32;
-        let reach = on.reach as i32;
-        let low = (row - at.y[1].min(reach)).max(0) as u32;
-        let high = row - at.y[0].max(-reach);
-        let (first, end) = if every == 1 {
-            (low as usize, high + 1)
-        } else {
-            (low.div_ceil(every as u32) as usize, if high < 0 { 0 } else { high / every + 1 })
-        };
-        let end = (end.max(0) as usize).min(on.target_rows);
-        BoxRows { first, count: end.saturating_sub(first), dy: row - first as i32 * every }
+        let row = on.row(a);
+        let [low, high] = at.y.map(i64::from);
+        let targets = on.targets_in([row - high.min(on.reach), row - low.max(-on.reach)]);
+        let dy = (row - targets.start as i64 * on.every) as i32;
+        BoxRows { first: targets.start, count: targets.len(), dy }
     }
 }
 
