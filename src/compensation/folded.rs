@@ -50,13 +50,11 @@ pub(super) fn body<V: Vectors>(
             field.take(a, h, input, sense);
         }
         taken = axis + reach + 1;
-        let next = (axis + on.every - reach).max(taken);
+        // Those that the next row of targets needs.
+        let next = [(axis + on.every - reach).max(taken), axis + on.every + reach + 1].map(|a| input.row + a);
         for strip in (0..columns).step_by(fold.strip) {
-            let ahead = Ahead {
-                h,
-                rows: [next, axis + on.every + reach + 1].map(|a| input.row + a),
-                column: input.column + on.shift + strip as i64 - h.window.column,
-            };
+            let column = input.column + on.shift + strip as i64;
+            let ahead = |tile| h.fetch::<V>(next, column + tile as i64);
             let columns = fold.strip.min(columns - strip);
             fold.strip::<V>(field, axis, left, [strip, columns], ahead, &mut row[strip..]);
         }
@@ -80,33 +78,6 @@ pub(super) fn work(profile: &Profile, columns: usize, rows: usize) -> f64 {
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Pair([[f32; LANES]; TILE / LANES]);
-
-/// Samples that the targets of the next row need.
-#[derive(Clone, Copy)]
-struct Ahead<'a> {
-    h: Rows<'a>,
-    /// From the first to before the last.
-    rows: [i64; 2],
-    /// Where the strip begins in a row.
-    column: i64,
-}
-
-impl Ahead<'_> {
-    /// Asks for those of a tile, which come from memory beside what is done until they are taken.
-    #[inline(always)]
-    fn fetch<V: Vectors>(&self, tile: usize) {
-        let window = self.h.window;
-        let [first, end] = self.rows;
-        for row in first.max(window.row)..end.min(window.row_end()) {
-            let z = self.h.row(row);
-            for i in (0..TILE).step_by(LANES) {
-                if let Some(z) = z.get((self.column + (tile + i) as i64) as usize) {
-                    V::fetch(z);
-                }
-            }
-        }
-    }
-}
 
 /// A strip of a row of targets, and what is worked out on the way.
 struct Fold {
@@ -140,7 +111,7 @@ impl Fold {
     }
 
     /// Columns `strip ..` of the targets whose axes stand in row `axis` of the field, the cutter's left end from column
-    /// `left` on: after those of the strip before.
+    /// `left` on: after those of the strip before. `ahead` asks for what is needed later, tile by tile.
     #[inline(always)]
     fn strip<V: Vectors>(
         &mut self,
@@ -148,7 +119,7 @@ impl Fold {
         axis: i64,
         left: usize,
         [strip, columns]: [usize; 2],
-        ahead: Ahead<'_>,
+        ahead: impl Fn(usize),
         to: &mut [f32],
     ) {
         let (reach, stride) = (self.reach, self.stride);
@@ -164,7 +135,7 @@ impl Fold {
         }
         for tile in (known..columns + 2 * reach + beside).step_by(TILE) {
             let i = start + tile;
-            ahead.fetch::<V>(tile);
+            ahead(tile);
             for (pair, dy) in self.pairs.iter_mut().zip(0..) {
                 let [below, above] = [-dy, dy].map(|dy| groups(&field.row(axis + dy)[i..][..TILE]));
                 for ((pair, below), above) in pair.0.iter_mut().zip(below).zip(above) {

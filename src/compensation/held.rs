@@ -1,5 +1,7 @@
 //! Rows of samples that a search reads: all of a window, or the latest of a part.
 
+use super::field::TILE;
+use super::lanes::{LANES, Vectors};
 use crate::grid::{Heights, Window};
 use crate::memory::untouched;
 
@@ -20,6 +22,20 @@ impl<'a> Rows<'a> {
         let place = self.first + (row - self.window.row) as usize;
         let place = if place < self.places { place } else { place - self.places };
         &self.z_mm[place * self.window.columns..][..self.window.columns]
+    }
+
+    /// Asks for a tile of columns from `column` on, as far as there are any, of the rows `first .. end`: reading them
+    /// from memory goes on beside what is done until they are taken.
+    #[inline(always)]
+    pub fn fetch<V: Vectors>(&self, [first, end]: [i64; 2], column: i64) {
+        for row in first.max(self.window.row)..end.min(self.window.row_end()) {
+            let z = self.row(row);
+            for i in (0..TILE as i64).step_by(LANES) {
+                if let Some(z) = z.get((column - self.window.column + i) as usize) {
+                    V::fetch(z);
+                }
+            }
+        }
     }
 }
 
