@@ -175,3 +175,80 @@ fn by_rows<V: Vectors>(field: &Field, on: &OnSamples, patch: Patch, at: &Offsets
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::brute;
+    use super::super::field::Sense;
+    use super::super::lanes::Portable;
+    use super::super::tiles::{OnTile, surfaces};
+    use super::super::{Profile, Tables, Way};
+    use super::*;
+    use crate::grid::Window;
+
+    #[test]
+    fn a_patch_raises_no_less_than_its_box_and_no_more_than_all_samples() {
+        let mut random = surfaces::Random(5);
+        let h = surfaces::from(90, 30, |_, _| 40.0 * random.next());
+        let whole = |random: &mut surfaces::Random, low: i32, high: i32| {
+            low + (random.next() * f64::from(high - low + 1)) as i32
+        };
+        for (cutter, every) in [("ball:0.14", 1), ("ball:0.14", 3), ("flat:0.1", 1)] {
+            let profile = Profile::new(cutter.parse().expect("a cutter"), 0.01, 0.0).expect("a profile");
+            let tables = Tables::new(profile);
+            let of = OnTile::new((&h).into(), &tables, every, Sense::Raise, Way::EveryTap);
+            let rows = h.window.rows.div_ceil(every);
+            let (input, on) = of.pairs(Window { rows, ..h.window });
+            let field = Field::of((&h).into(), input, Sense::Raise);
+            let mut all = Targets::new(h.window.columns, rows);
+            brute::every_tap(&field, &on, false, &mut all);
+            let reach = on.reach as i32;
+            for _ in 0..4000 {
+                let random = &mut random;
+                let patch_rows = whole(random, 1, 8);
+                let len = whole(random, 1, 40);
+                let patch = Patch {
+                    a: whole(random, 0, field.rows as i32 - patch_rows).into(),
+                    rows: patch_rows as usize,
+                    first: whole(random, 0, field.columns as i32 - len) as usize,
+                    len: len as usize,
+                };
+                let [x, y] = [0; 2].map(|_| {
+                    let low = whole(random, -reach - 1, reach);
+                    [low, low + whole(random, 0, 3)]
+                });
+                let mut raised = Targets::new(h.window.columns, rows);
+                raise_patch::<Portable>(&field, &on, patch, &Offsets { x, y }, &mut raised);
+                let mut least = Targets::new(h.window.columns, rows);
+                for a in patch.a..patch.a + patch.rows as i64 {
+                    for b in 0..rows {
+                        let dy = on.row(a) - b as i64 * on.every;
+                        let Some(arc) = on.stencil.arc(dy) else { continue };
+                        if dy < y[0].into() || dy > y[1].into() {
+                            continue;
+                        }
+                        for i in patch.first..patch.first + patch.len {
+                            for dx in x[0].max(arc.arc.lo)..=x[1].min(arc.arc.hi) {
+                                let column = i as i64 - on.shift - i64::from(dx);
+                                if (0..h.window.columns as i64).contains(&column) {
+                                    let z = field.row(a)[PAD + i] + arc.s(dx);
+                                    let to = &mut least.row_mut(b)[column as usize];
+                                    *to = to.max(z);
+                                }
+                            }
+                        }
+                    }
+                }
+                for b in 0..rows {
+                    for column in 0..h.window.columns {
+                        let [least, z, most] = [&least, &raised, &all].map(|of| of.row(b)[column]);
+                        assert!(
+                            least <= z && z <= most,
+                            "{cutter}, every {every}: {x:?} {y:?}, {z} at {column}, {b}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
